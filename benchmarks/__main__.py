@@ -26,7 +26,7 @@ import pyverlet as pv
 from benchmarks import beside, busy, changes, data, law, linked_frames, links, materials, own, page, physics, scale, soak
 from benchmarks.engines import CAREFUL, DT, ENGINES, Engine, Heap, overlap
 from benchmarks.tables import write
-from pyverlet.ground.threads import max_threads
+from pyverlet.common.threads import max_threads
 from pyverlet.scenes import report
 
 SETTLE_SECONDS = 10.0

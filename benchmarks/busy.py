@@ -18,7 +18,7 @@ import numpy as np
 import pyverlet as pv
 from benchmarks.engines import DT
 from benchmarks.tables import timed
-from pyverlet.ground.threads import max_threads
+from pyverlet.common.threads import max_threads
 
 TURNS = 8
 """Of each world; a turn is long enough for the threads of the other to have gone to sleep."""

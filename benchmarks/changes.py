@@ -14,7 +14,7 @@ import numpy as np
 import pyverlet as pv
 from benchmarks.engines import DT
 from benchmarks.own import Row, heap, in_turn, stepping, told
-from pyverlet.ground.threads import max_threads
+from pyverlet.common.threads import max_threads
 
 FRAMES = 24
 

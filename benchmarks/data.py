@@ -14,8 +14,8 @@ from typing import Any, NamedTuple
 import numpy as np
 
 import pyverlet as pv
+from pyverlet.common.threads import max_threads
 from pyverlet.data import sweep_run
-from pyverlet.ground.threads import max_threads
 
 DT = 1 / 60
 ROUNDS = 5

@@ -22,7 +22,7 @@ import numpy as np
 import pyverlet as pv
 from benchmarks.engines import DT, RADIUS, Engine, Heap, Pymunk, PyverletOneThread
 from benchmarks.tables import timed
-from pyverlet.ground.memory import mapped
+from pyverlet.common.memory import mapped
 
 SUBSTEPS = 8
 SETTLE_SECONDS = 10.0

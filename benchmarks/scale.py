@@ -25,7 +25,7 @@ from benchmarks import roofline
 from benchmarks.engines import DT
 from benchmarks.own import SETTLED_REBUILDS
 from benchmarks.tables import write
-from pyverlet.ground.threads import max_threads
+from pyverlet.common.threads import max_threads
 from pyverlet.world.team import Team, ladder
 
 LEAST = 1_000

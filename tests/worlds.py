@@ -10,12 +10,12 @@ import numpy as np
 import pytest
 
 import pyverlet as pv
-from pyverlet.state.slots import Slots
+from pyverlet.state.sorted_state import SortedState
 
 G, FRAME, H = 9.81, 1 / 60, 1 / 480
 """m/s^2; s, and that of a substep as worlds are by themselves."""
 
-HEARD = {"events": True, "contacts": True, "ledger": True}
+RECORDING = {"events": True, "contacts": True, "ledger": True}
 
 
 def points(x: Any, y: Any) -> Any:
@@ -49,11 +49,11 @@ def refused(says: str, ask: Callable[..., object], *given: Any, **named: Any) ->
 
 def forces_of(law: Any, world: pv.World) -> Any:
     """(n, 2) N of a force alone, in the user's order."""
-    slots = Slots(world.dtype)
-    slots.gather(world._state)
-    law.apply(slots, 0.0)
-    out = np.empty_like(slots.force)
-    out[slots.particle] = slots.force
+    sorted_state = SortedState(world.dtype)
+    sorted_state.gather(world._state)
+    law.apply(sorted_state, 0.0)
+    out = np.empty_like(sorted_state.force)
+    out[sorted_state.particle] = sorted_state.force
     return out.astype(float)
 
 
@@ -325,7 +325,7 @@ def bouncing(**options: Any) -> pv.World:
 
 
 def crossing(**options: Any) -> pv.World:
-    """Obstacles that move, and a link that breaks, across the seam of a periodic room."""
+    """Obstacles that move, and a link that breaks, across the boundary of a periodic room."""
     world = pv.World(boundary=pv.Periodic((0, 0), (12, 12), axes="x"), **options)
     world.add(position=pv.fill(pv.Box((1, 5), (11, 11)), radius=0.4, count=60).position, radius=0.4)
     world.obstacles += [pv.Capsule((3, 1), (9, 1), radius=0.3, angular_velocity=1.0), pv.Disc((6, 3), 0.5, velocity=(0.5, 0))]
@@ -367,7 +367,7 @@ def said(world: pv.World) -> dict[str, Any]:
     }  # fmt: skip
     if world.keeps_ledger:
         found["ledger"] = world.ledger.as_dict()
-    if world.tells_events:
+    if world.records_events:
         for name in ("begin", "hit", "end"):
             each = getattr(world.events, name)
             found[name] = {field: each[field].tobytes() for field in each.dtype.names if field != "number"}

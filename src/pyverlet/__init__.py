@@ -5,17 +5,18 @@ from __future__ import annotations
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
-from pyverlet.ground import loading, versions  # noqa: F401  (first: all that follows takes a second)
+from pyverlet.common import loading, versions  # noqa: F401  (first: all that follows takes a second)
 
 # isort: split
 from pyverlet import core  # noqa: F401  (next: it may be missing, or made for another Python)
 
 # isort: split
 from pyverlet import scenes
-from pyverlet.ground import errors
-from pyverlet.ground.errors import CoarseCoordinatesWarning, CoarseStepsWarning, InputError, NonFiniteError, PyverletError
-from pyverlet.ground.submodules import lazily
+from pyverlet.common import errors
+from pyverlet.common.errors import CoarseCoordinatesWarning, CoarseStepsWarning, InputError, NonFiniteError, PyverletError
+from pyverlet.common.submodules import lazily
 from pyverlet.laws import forces, integrators
+from pyverlet.laws.boundaries import Boundary, Box, Circle, Open, Periodic
 from pyverlet.laws.collisions import BruteForce, Collisions, Fast, Overlap
 from pyverlet.laws.events import Events
 from pyverlet.laws.forces import (
@@ -48,9 +49,8 @@ from pyverlet.laws.integrators import (
 )
 from pyverlet.laws.ledger import Ledger
 from pyverlet.laws.links import Angle, AngleLimit, Area, Motor, Pin, Rope, Spring, Stick
-from pyverlet.laws.naive import ClampAndFlip, ProjectOnly
 from pyverlet.laws.obstacles import Capsule, Chain, Disc, Obstacle, Polygon, Segment
-from pyverlet.laws.rooms import Boundary, Box, Circle, Open, Periodic
+from pyverlet.laws.textbook import ClampAndFlip, ProjectOnly
 from pyverlet.scenes.sliders import Slider, slider
 from pyverlet.state.group import Group, Particle
 from pyverlet.world import builders

@@ -93,7 +93,7 @@ def test_sums_over_all_do_not_depend_on_the_order_of_slots(tmp_path: Path) -> No
     world.run(seconds=3 / 60)
     again = from_file(world, tmp_path)
     again.step(1 / 60)
-    assert again._slots.total_mass == world._slots.total_mass
+    assert again._sorted.total_mass == world._sorted.total_mass
 
 
 def test_links_are_solved_alike_whoever_was_pinned_on_the_way(tmp_path: Path) -> None:

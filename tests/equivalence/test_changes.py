@@ -35,16 +35,16 @@ def pour(count: int = 40, **options: Any) -> pv.World:
 def told(w: pv.World) -> list[Any]:
     """All that a frame leaves behind, as bytes."""
     arrays = [array.tobytes() for _, array in w._state.arrays()]
-    return [w.time, w.frames, w.profile.frames, *arrays, w._slots.wall_hits.tobytes(), w.energy()]
+    return [w.time, w.frames, w.profile.frames, *arrays, w._sorted.wall_hits.tobytes(), w.energy()]
 
 
 def observe(w: pv.World) -> None:
     """A call for each substep: somebody looks at the world between them."""
 
-    def look(moment: Any) -> None:
-        moment.look()
+    def look(snapshot: Any) -> None:
+        snapshot.look()
 
-    w.onlooker = look
+    w.observer = look
 
 
 @pytest.fixture
@@ -144,7 +144,7 @@ EDITS: dict[str, Any] = {
     "segment": lambda w: w.obstacles.append(pv.Segment((-2, -5), (2, -5))),
     "moving obstacle": lambda w: w.obstacles.append(pv.Disc((2, 1), 0.3, velocity=(0, 1))),
     "periodic": lambda w: setattr(w, "boundary", pv.Periodic((-6, -7), (6, 7), axes="x")),
-    "noting": lambda w: w.noting_contacts().__enter__(), "threads": lambda w: setattr(w, "threads", 1),
+    "records_contacts": lambda w: w.recording_contacts().__enter__(), "threads": lambda w: setattr(w, "threads", 1),
     "saved": lambda w: w.restore(w.save()), "gone back": gone_back,
 }  # fmt: skip
 
@@ -175,14 +175,14 @@ def test_a_crush_that_the_limiter_takes_back_is_the_same_if_it_is_observed() -> 
 
 def test_an_observer_may_change_the_world() -> None:
     # Gravity turns between the first two substeps: the same whether frames were plain until then or not.
-    def turn(moment: Any) -> None:
+    def turn(snapshot: Any) -> None:
         world.gravity = (1, -9)
 
     worlds = [pour(boundary=ROOMS["cage"]()) for _ in range(2)]
     observe(worlds[1])
     for world in worlds:
         world.run(seconds=0.5)
-        world.onlooker = turn
+        world.observer = turn
         world.run(seconds=0.5)
     assert told(worlds[0]) == told(worlds[1])
 
@@ -201,7 +201,7 @@ def test_shorter_frames_of_the_same_substeps_are_not_taken_for_the_longer_ones()
 
 def test_a_frame_that_was_broken_off_leaves_the_one_before() -> None:
     # Somebody who looks fails between two substeps: the world holds the frame before, and a heap at rest stays at rest.
-    def fail(moment: Any) -> None:
+    def fail(snapshot: Any) -> None:
         raise ZeroDivisionError
 
     world = pour(boundary=pv.Circle(radius=8, friction=0.5), collisions=pv.Collisions(friction=0.5))
@@ -209,10 +209,10 @@ def test_a_frame_that_was_broken_off_leaves_the_one_before() -> None:
     for frame in range(60):
         before = told(world)
         if frame % 7 == 5:
-            world.onlooker = fail
+            world.observer = fail
             with pytest.raises(ZeroDivisionError):
                 world.step(1 / 60)
-            world.onlooker = None
+            world.observer = None
             assert told(world)[:-3] == before[:-3]
         world.step(1 / 60)
         assert np.abs(world.velocity).max() < 1e-3, frame

@@ -11,7 +11,7 @@ from tests.worlds import points, refused
 import pyverlet as pv
 from pyverlet.laws.collisions import find_contacts
 from pyverlet.state.neighbours import VerletList, list_pairs, near
-from pyverlet.state.seam import NONE, Seam
+from pyverlet.state.periodicity import NONE, Periodicity
 
 
 @settings(max_examples=90, deadline=None)
@@ -62,15 +62,15 @@ def test_one_circle_that_comes_near_asks_for_a_new_list() -> None:
 
 ROOMS = {
     "open": NONE,
-    "both": Seam(-1.0, 2.0, 10.0, 7.0),
-    "x": Seam(-1.0, 0.0, 10.0, 0.0),
-    "y": Seam(0.0, 2.0, 0.0, 7.0),
-    "narrow": Seam(-1.0, 2.0, 1.7, 2.5),  # of one and of two cells
+    "both": Periodicity(-1.0, 2.0, 10.0, 7.0),
+    "x": Periodicity(-1.0, 0.0, 10.0, 0.0),
+    "y": Periodicity(0.0, 2.0, 0.0, 7.0),
+    "narrow": Periodicity(-1.0, 2.0, 1.7, 2.5),  # of one and of two cells
 }
 
 
-def brute_force(position: Any, reach: float, seam: Seam) -> set[tuple[int, int]]:
-    way = seam.nearest((position[None, :] - position[:, None]).astype(float))
+def brute_force(position: Any, reach: float, periodic: Periodicity) -> set[tuple[int, int]]:
+    way = periodic.nearest((position[None, :] - position[:, None]).astype(float))
     i, j = np.nonzero((way**2).sum(axis=2) < reach * reach)
     return {(a, b) for a, b in zip(i.tolist(), j.tolist(), strict=True) if a < b}
 
@@ -100,21 +100,21 @@ def test_more_pairs_than_eight_a_particle_and_far_outliers() -> None:
 
 @pytest.mark.parametrize("room", ["open", "both"])
 def test_verlet_lists_give_the_pairs_of_now(room: str) -> None:
-    rng, seam = np.random.default_rng(1), ROOMS[room]
+    rng, periodic = np.random.default_rng(1), ROOMS[room]
     position, order = rng.uniform(0, 8, (400, 2)).astype(np.float32), np.zeros(1)
     kept = VerletList(0.7)
     for _ in range(60):
         position += rng.normal(0, 0.01, position.shape).astype(np.float32)
-        if seam:
-            seam.wrap(position)  # a jump of a whole period is no way
-        ours, now = kept.within(position, order, seam, 0.7), near(position, 0.7, seam)
+        if periodic:
+            periodic.wrap(position)  # a jump of a whole period is no way
+        ours, now = kept.within(position, order, periodic, 0.7), near(position, 0.7, periodic)
         for a, b in zip((*ours,), (*now,), strict=True):
             assert np.asarray(a).tobytes() == np.asarray(b).tobytes()
     # A step is 0.045 for the one of 400 that moves most, and half the skin 0.07: not in every step, but often.
     assert 5 < kept.made < 40
-    kept.within(position, np.zeros(1), seam, 0.7)
+    kept.within(position, np.zeros(1), periodic, 0.7)
     made = kept.made
-    kept.within(position + np.float32(0.05), np.zeros(1), seam, 0.7)
+    kept.within(position + np.float32(0.05), np.zeros(1), periodic, 0.7)
     assert kept.made == made + 1  # sorted anew
 
 
@@ -125,7 +125,7 @@ def test_a_world_tells_its_neighbours() -> None:
     assert i.tolist() == [0, 2, 3]
     assert j.tolist() == [1, 4, 4]  # 2 and 3 are at the same place
     assert distance == pytest.approx([1.0, 0.6, 0.6], rel=1e-6)
-    assert way[0] == pytest.approx([-1, 0])  # through the seam
+    assert way[0] == pytest.approx([-1, 0])  # through the periodic boundary
     refused("range is 6; allowed in this periodic room is at most 5", world.neighbours, 6.0)
     refused("range is 0", world.neighbours, 0.0)
     assert len(pv.World().neighbours(1.0).i) == 0

@@ -10,25 +10,25 @@ from tests.worlds import bits_after, grid
 
 import pyverlet as pv
 from pyverlet import core
-from pyverlet.state.slots import Slots
+from pyverlet.state.sorted_state import SortedState
 from pyverlet.world.team import Team
 
 Array = np.ndarray[Any, Any]
 
 
-def brute_force(slots: Slots, listed: Array, skin: float) -> set[tuple[int, int]]:
+def brute_force(sorted_state: SortedState, listed: Array, skin: float) -> set[tuple[int, int]]:
     """Pairs of slots whose rims are nearer than the skin, of which one is free and which take each other's category.
 
     listed: (n, 2) where they were when the list was made; pinned circles then push out at once what overlaps them.
     """
-    place, n = listed.astype(float), len(slots)
+    place, n = listed.astype(float), len(sorted_state)
     i, j = np.triu_indices(n, 1)
-    way = slots.seam.nearest(place[j] - place[i])
-    near = np.hypot(*way.T) < slots.radius[i].astype(float) + slots.radius[j] + skin
-    near &= (slots.inverse_mass[i] > 0) | (slots.inverse_mass[j] > 0)
-    if len(slots.category):
-        near &= (slots.category[i] & slots.mask[j]) != 0
-        near &= (slots.category[j] & slots.mask[i]) != 0
+    way = sorted_state.periodic.nearest(place[j] - place[i])
+    near = np.hypot(*way.T) < sorted_state.radius[i].astype(float) + sorted_state.radius[j] + skin
+    near &= (sorted_state.inverse_mass[i] > 0) | (sorted_state.inverse_mass[j] > 0)
+    if len(sorted_state.category):
+        near &= (sorted_state.category[i] & sorted_state.mask[j]) != 0
+        near &= (sorted_state.category[j] & sorted_state.mask[i]) != 0
     return set(zip(i[near].tolist(), j[near].tolist(), strict=True))
 
 
@@ -38,7 +38,7 @@ def listed(world: pv.World) -> tuple[set[tuple[int, int]], Array]:
     Behind the batches of a group are pairs of which one is pinned: they are no part of the sweeps.
     """
     first, count, i, j = world._frames.listed()
-    swept, free = world._frames.held.engine.arrays["swept"], world._slots.inverse_mass > 0
+    swept, free = world._frames.held.engine.arrays["swept"], world._sorted.inverse_mass > 0
     pairs: list[tuple[int, int]] = []
     for a, n, whole in zip(first.tolist(), swept[: len(first)].tolist(), count.tolist(), strict=True):
         assert n % 8 == 0
@@ -93,20 +93,20 @@ def test_the_list_is_that_of_all_pairs_against_all(kind: str, sizes: str, dtype:
         if seed == 3:
             world.category[: n // 3], world.mask[: n // 2] = 2, 1
         world.step(1e-9)
-        slots, skin = world._slots, world._frames.held.engine.save_list()[2][1] * 2
+        sorted_state, skin = world._sorted, world._frames.held.engine.save_list()[2][1] * 2
         found, _ = listed(world)
         # Rounding of coordinates, and of periods, decides about pairs at the very rim of the skin.
         slack = 1e-5 if dtype == np.float32 else 1e-12
         then = world._frames.held.engine.arrays["listed"]
-        assert brute_force(slots, then, skin - slack) <= found, (kind, sizes, n)
+        assert brute_force(sorted_state, then, skin - slack) <= found, (kind, sizes, n)
         far = set(reaching_farther(world).tolist())  # those that overlaps throw farther than the skin
-        for pair in found - brute_force(slots, then, skin + 30 * slack):
+        for pair in found - brute_force(sorted_state, then, skin + 30 * slack):
             assert not far.isdisjoint(pair), (kind, sizes, n)
 
 
 def reaching_farther(world: pv.World) -> Array:
     """Slots of those that the list takes to reach farther than their radius, and of very large ones."""
-    arrays, radius = world._frames.held.engine.arrays, world._slots.radius
+    arrays, radius = world._frames.held.engine.arrays, world._sorted.radius
     order, cell = arrays["order"], arrays["cell"]
     return np.union1d(order[arrays["spot_r"][: len(radius)] > radius[order]], np.flatnonzero(cell == cell.max()))
 
@@ -123,10 +123,10 @@ def test_fine_discs_that_are_fast_are_listed_by_the_way_they_go(kind: str, sizes
     world.add(position=place, velocity=velocity, radius=radius, on_overlap="push")
     world.step(h)
     found, _ = listed(world)
-    slots = world._slots
-    place, velocity, radius = place[slots.particle], velocity[slots.particle], radius[slots.particle]
+    sorted_state = world._sorted
+    place, velocity, radius = place[sorted_state.particle], velocity[sorted_state.particle], radius[sorted_state.particle]
     i, j = np.triu_indices(n, 1)
-    apart = np.hypot(*slots.seam.nearest(place[j] - place[i]).T) - radius[i] - radius[j]
+    apart = np.hypot(*sorted_state.periodic.nearest(place[j] - place[i]).T) - radius[i] - radius[j]
     meet = apart < np.hypot(*(velocity[j] - velocity[i]).T) * h
     assert set(zip(i[meet].tolist(), j[meet].tolist(), strict=True)) <= found
     cell = world._frames.held.engine.arrays["cell"]
@@ -146,7 +146,7 @@ def test_without_cells_every_pair_is_listed_once_and_for_all(kind: str, dtype: A
     world.category[2], world.mask[2] = 2, 2
     world.run(seconds=1)
     found, _ = listed(world)
-    assert found == brute_force(world._slots, world._slots.position, np.inf)
+    assert found == brute_force(world._sorted, world._sorted.position, np.inf)
     assert len(found) == 39 * 38 // 2 - 1
     assert world.rebuilds == 1
 
@@ -203,7 +203,7 @@ def test_lists_follow_particles_that_come_and_go(kind: str, sizes: str) -> None:
         assert np.array_equal(lanes, others), seed
         engine = world._frames.held.engine
         if len(engine.save_list()[0]):
-            pairs = brute_force(world._slots, engine.arrays["listed"], engine.save_list()[2][1] * 2 - 1e-5)
+            pairs = brute_force(world._sorted, engine.arrays["listed"], engine.save_list()[2][1] * 2 - 1e-5)
             assert pairs <= found, seed
 
 
@@ -315,4 +315,4 @@ def test_who_touches_is_always_listed(kind: str, sizes: str) -> None:
         if frame == 25:
             world.mask[:20] = 2
         world.step(1 / 60)
-        assert brute_force(world._slots, world._slots.position, -1e-6) <= listed(world)[0]
+        assert brute_force(world._sorted, world._sorted.position, -1e-6) <= listed(world)[0]

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 from tests.programs import python
-from tests.worlds import HEARD, WORLDS, bits_after, each_frame, go_on_alike, noted, said
+from tests.worlds import RECORDING, WORLDS, bits_after, each_frame, go_on_alike, noted, said
 
 import pyverlet as pv
 from pyverlet.world.team import Team
@@ -141,7 +141,7 @@ def test_worlds_have_something_to_remember() -> None:
 )
 def test_taken_up_again_it_goes_on_with_the_same_bits(name: str, dtype: Any, listens: bool, tmp_path: Path) -> None:
     """From a saved state, a copy, a pickle and a file; in the middle of a fall, and later, when others have gone."""
-    world = WORLDS[name](dtype=dtype, **(HEARD if listens else {}))
+    world = WORLDS[name](dtype=dtype, **(RECORDING if listens else {}))
     for count in (15, 12):
         world.run(seconds=count / 60)
         go_on_alike(world, tmp_path)
@@ -155,7 +155,7 @@ def test_any_number_of_threads_has_the_same_bits(name: str, monkeypatch: pytest.
     for numbers in ((1,), (2,), (3,), (2, 1, 3)):
         turns = cycle(numbers)
         monkeypatch.setattr(Team, "size", lambda team, most, frame_ms, turns=turns: next(turns))
-        world, used = WORLDS[name](**HEARD, threads=1 if numbers == (1,) else 2), set()
+        world, used = WORLDS[name](**RECORDING, threads=1 if numbers == (1,) else 2), set()
         for _ in each_frame(world, 20):
             used |= {world._frames.held.parts} if world.collisions else set()
         found.append(noted(world))
@@ -165,7 +165,7 @@ def test_any_number_of_threads_has_the_same_bits(name: str, monkeypatch: pytest.
 
 @EVERY_PRECISION
 def test_it_moves_alike_whether_anybody_listens(name: str, dtype: Any) -> None:
-    plain, heard = WORLDS[name](dtype=dtype), WORLDS[name](dtype=dtype, **HEARD)
+    plain, heard = WORLDS[name](dtype=dtype), WORLDS[name](dtype=dtype, **RECORDING)
     for _ in range(2):
         for world in (plain, heard):
             world.run(seconds=9 / 60)

@@ -16,7 +16,7 @@ from tests.worlds import refused
 
 from pyverlet import force
 from pyverlet.cli import main
-from pyverlet.ground.errors import NonFiniteError
+from pyverlet.common.errors import NonFiniteError
 from pyverlet.lab import fuzz, physics
 from pyverlet.lab.fuzz import Broken, Program, check, look_at, random_program, shrink
 from pyverlet.lab.physics import energy, friction, gas, lost

@@ -84,7 +84,7 @@ def test_bonds_are_of_one_world() -> None:
         assert each.energy().potential == pytest.approx(-2.5, rel=1e-4)
 
 
-def test_bonds_pull_in_the_pressure_through_the_seam() -> None:
+def test_bonds_pull_in_the_pressure_through_the_boundary() -> None:
     """P = (sum of force times distance) / 2 A at rest: -6 N at a gap of 0.2 m, 2.2 m between the centres."""
     world = empty(boundary=pv.Periodic((0, 0), (10, 10)), contacts=True)
     world.add(position=[(9.5, 5), (1.7, 5)], radius=1.0)

@@ -65,7 +65,7 @@ def test_walls_that_are_filtered_out_are_not_there(name: str, dtype: Any, own: b
     for each in (world, free):
         drop(each)
         each.run(seconds=1.5, dt=DT)
-    where = world.boundary.seam.nearest(world.position - free.position)
+    where = world.boundary.periodic.nearest(world.position - free.position)
     where[:, 1] -= 9 * np.round(where[:, 1] / 9) if name == "channel" else 0
     assert where == pytest.approx(0.0, abs=1e-11 if dtype == np.float64 else 1e-3)
     assert np.abs(world.position[:, 1]).max() > 15

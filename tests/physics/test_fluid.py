@@ -104,7 +104,7 @@ def test_a_seam_ends_neither_pairs_nor_floor_nor_disc(axes: str, move: tuple[flo
     force = forces_of(fluid, world)
     for group in groups:
         group.position += move
-        group.position[:] = world.boundary.seam.wrapped(np.ascontiguousarray(group.position))
+        group.position[:] = world.boundary.periodic.wrapped(np.ascontiguousarray(group.position))
     assert np.abs(force[-1]).max() > 0
     assert forces_of(fluid, world) == pytest.approx(force, abs=1e-9 * np.abs(force).max())
 

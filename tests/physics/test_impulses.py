@@ -158,10 +158,10 @@ def test_a_disc_bounces_from_a_slanted_segment_as_on_paper(e: float, mu: float, 
     disc = world.add(position=2 * normal, velocity=start, radius=R)
     world.run(seconds=4.0 / speed + 2 * DT, dt=DT)
     into, along = -float(start @ normal), float(start @ way)
-    rubbed = min(mu * (1 + e) * into, along / 3)
+    tangent = min(mu * (1 + e) * into, along / 3)
     assert disc.velocity[0] @ normal == pytest.approx(e * into, rel=1e-12)
-    assert disc.velocity[0] @ way == pytest.approx(along - rubbed, rel=1e-12)
-    assert disc.spin[0] == pytest.approx(-2 * rubbed / R, rel=1e-12)
+    assert disc.velocity[0] @ way == pytest.approx(along - tangent, rel=1e-12)
+    assert disc.spin[0] == pytest.approx(-2 * tangent / R, rel=1e-12)
 
 
 def test_a_field_of_round_pegs_keeps_the_energy_of_elastic_discs() -> None:

@@ -150,12 +150,12 @@ def test_the_ledger_in_a_well_and_with_contacts() -> None:
     world.forces.append(pv.PointSpring(center=(10, 10), stiffness=1.0))
     start = world.energy().total
     world.run(seconds=60 / 60)
-    books = world.ledger
-    assert books.total == pytest.approx(world.energy().total, rel=1e-9)
-    assert books.restitution < -1.0
-    assert books.thermostat > 50.0
+    ledger = world.ledger
+    assert ledger.total == pytest.approx(world.energy().total, rel=1e-9)
+    assert ledger.restitution < -1.0
+    assert ledger.thermostat > 50.0
     # Order 2 in omega h = 2e-3, and kicks that shift positions by up to v h / 2 in a well: below 1e-3 of what there is.
-    assert abs(books.residual) < 1e-3 * start
+    assert abs(ledger.residual) < 1e-3 * start
 
 
 @pytest.mark.parametrize("dtype", [np.float32, np.float64])

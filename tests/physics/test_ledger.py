@@ -142,10 +142,10 @@ def test_what_the_limiter_takes_has_an_account() -> None:
     world = undamped(gravity=(0, 0))
     world.add(position=np.random.default_rng(0).uniform(-1, 1, (40, 2)), radius=0.5)
     world.run(seconds=1)
-    books = world.ledger
-    assert books.limiter < 0 < books.projection
+    ledger = world.ledger
+    assert ledger.limiter < 0 < ledger.projection
     # Sums of what 10^5 contacts gave and took, 1e2 J in all, each rounded by eps.
-    assert abs(books.total) == pytest.approx(world.energy().total, abs=1e-11)
+    assert abs(ledger.total) == pytest.approx(world.energy().total, abs=1e-11)
     assert world.energy().kinetic < 1e-12
     world.run(seconds=30)
     assert world.overlap().max < 1e-6

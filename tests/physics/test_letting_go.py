@@ -29,7 +29,7 @@ HELD: dict[str, tuple[Callable[[pv.World], Any], Callable[[pv.World, Any], objec
     "floor removed": (floor, lambda world, it: world.obstacles.remove(it)),
     "floor passable": (floor, lambda world, it: setattr(it, "mask", 0)),
     "mask": (floor, lambda world, it: world.mask.__setitem__(0, 0)),
-    "category": (floor, lambda world, it: world.category.__setitem__(0, 2) or setattr(it, "mask", 1)),
+    "category": (floor, lambda world, it: setattr(it, "mask", ~1 & 0xFFFFFFFF)),
     "lower removed": (lambda world: world.add(position=(0, -0.5), radius=0.5).pin(), lambda world, it: world.remove(1)),
     "stick": (hung(pv.Stick), lambda world, it: world.links.remove(it)),
     "rope": (hung(pv.Rope), lambda world, it: world.links.remove(it)),

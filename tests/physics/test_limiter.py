@@ -8,24 +8,24 @@ from tests.worlds import G, each_frame, points, worst_rise
 
 import pyverlet as pv
 from pyverlet import scenes
-from pyverlet.ground.constants import SURPLUS
+from pyverlet.common.constants import SURPLUS
 from pyverlet.lab.physics import energy as rows
 from pyverlet.lab.physics.energy import scale
 from pyverlet.laws import limiter
-from pyverlet.state.slots import Slots
+from pyverlet.state.sorted_state import SortedState
 
 
 @pytest.fixture
 def taken(monkeypatch: pytest.MonkeyPatch) -> list[float]:
     """J that were taken back, frame by frame."""
     amounts: list[float] = []
-    real = limiter.EnergyLimiter.take_back
+    real = limiter.EnergyLimiter.limit_energy
 
-    def noted(self: limiter.EnergyLimiter, slots: object, pairs: object, surplus: float) -> object:
+    def noted(self: limiter.EnergyLimiter, sorted_state: object, pairs: object, surplus: float) -> object:
         amounts.append(surplus)
-        return real(self, slots, pairs, surplus)  # type: ignore[arg-type]
+        return real(self, sorted_state, pairs, surplus)  # type: ignore[arg-type]
 
-    monkeypatch.setattr(limiter.EnergyLimiter, "take_back", noted)
+    monkeypatch.setattr(limiter.EnergyLimiter, "limit_energy", noted)
     return amounts
 
 
@@ -131,22 +131,22 @@ def test_momentum_and_angular_momentum_stay(monkeypatch: pytest.MonkeyPatch) -> 
     rng = np.random.default_rng(2)
     circles = world.add(position=rng.uniform(-0.3, 0.3, (60, 2)), velocity=(3.0, -1.0), radius=0.5, mass=rng.uniform(1, 5, 60))
     circles.velocity += 0.5 * np.column_stack((-circles.position[:, 1], circles.position[:, 0]))
-    real, times = limiter.EnergyLimiter.take_back, 0
+    real, times = limiter.EnergyLimiter.limit_energy, 0
 
-    def momenta(slots: Slots) -> np.ndarray:
-        (x, y), (vx, vy), m = slots.position.T, slots.velocity.T, slots.mass
+    def momenta(sorted_state: SortedState) -> np.ndarray:
+        (x, y), (vx, vy), m = sorted_state.position.T, sorted_state.velocity.T, sorted_state.mass
         return np.array([m @ vx, m @ vy, m @ (x * vy - y * vx)])
 
-    def compared(self: limiter.EnergyLimiter, slots: Slots, pairs: object, surplus: float) -> None:
+    def compared(self: limiter.EnergyLimiter, sorted_state: SortedState, pairs: object, surplus: float) -> None:
         nonlocal times
-        before, velocity = momenta(slots), slots.velocity.copy()
-        real(self, slots, pairs, surplus)  # type: ignore[arg-type]
-        times += bool(np.abs(slots.velocity - velocity).max() > 1e-6)
-        size = float((slots.mass * np.hypot(*slots.velocity.T) * (1 + np.hypot(*slots.position.T))).sum())
-        assert momenta(slots)[:2] == pytest.approx(before[:2], abs=1e-14 * size)
-        assert momenta(slots)[2] == pytest.approx(before[2], abs=1e-7 * size)
+        before, velocity = momenta(sorted_state), sorted_state.velocity.copy()
+        real(self, sorted_state, pairs, surplus)  # type: ignore[arg-type]
+        times += bool(np.abs(sorted_state.velocity - velocity).max() > 1e-6)
+        size = float((sorted_state.mass * np.hypot(*sorted_state.velocity.T) * (1 + np.hypot(*sorted_state.position.T))).sum())
+        assert momenta(sorted_state)[:2] == pytest.approx(before[:2], abs=1e-14 * size)
+        assert momenta(sorted_state)[2] == pytest.approx(before[2], abs=1e-7 * size)
 
-    monkeypatch.setattr(limiter.EnergyLimiter, "take_back", compared)
+    monkeypatch.setattr(limiter.EnergyLimiter, "limit_energy", compared)
     world.run(seconds=1)
     assert times > 10
 
@@ -174,7 +174,7 @@ def test_gravity_that_turns_within_a_frame_is_no_gain(taken: list[float]) -> Non
     # Heights are worth something else then: m (g - g') . x of energy that no contact has given. Two balls fly undisturbed.
     world = pv.World(boundary=pv.Circle(radius=50), gravity=(0, G))
     balls = world.add(position=[(0, 10), (0, 20)], velocity=(0, 1), radius=0.5)
-    world.onlooker = lambda moment: setattr(world, "gravity", (0.0, -G))
+    world.observer = lambda snapshot: setattr(world, "gravity", (0.0, -G))
     world.step(1 / 60)
     assert not taken
     # One substep of v' = g, seven of v' = -g.

@@ -37,7 +37,7 @@ def test_free_flight_goes_on_from_there(name: str, dtype: Any) -> None:
 @pytest.mark.parametrize("integrator", [pv.PositionVerlet, pv.TimeCorrectedVerlet, pv.VelocityVerlet, pv.RK4])
 @pytest.mark.parametrize("axes", [None, "xy", "x"])
 def test_a_linked_body_keeps_its_shape_and_its_pulls(axes: str | None, integrator: Any) -> None:
-    """A wheel of sticks turns freely: moved across the seam it turns on as its twin that is not moved."""
+    """A wheel of sticks turns freely: moved across the periodic boundary it turns on as its twin that is not moved."""
     room = pv.Open() if axes is None else pv.Periodic((-10, -10), (10, 10), axes=axes)
     options: dict[str, Any] = {"boundary": room, "dtype": np.float64, "collisions": None}
     worlds = [pv.World(gravity=(0, 0), integrator=integrator(), **options) for _ in range(2)]
@@ -54,8 +54,8 @@ def test_a_linked_body_keeps_its_shape_and_its_pulls(axes: str | None, integrato
     first, twin = groups
     pulls = worlds[0].links[0].force
     assert pulls.min() > 1.0
-    goal = np.array([9.8, -9.6]) if axes == "xy" else np.array([9.8, 3.0])  # across the seam
-    for _ in range(2):  # the second time it lies across the seam before
+    goal = np.array([9.8, -9.6]) if axes == "xy" else np.array([9.8, 3.0])  # across the periodic boundary
+    for _ in range(2):  # the second time it lies across the periodic boundary before
         first.move_to(goal)
         center = first.unwrapped.mean(axis=0)
         assert center == pytest.approx(goal, abs=1e-12)
@@ -185,7 +185,7 @@ def test_places_in_any_memory_order_and_never_in_the_middle_of_a_frame() -> None
     assert world.position.tolist() == [[2, 3], [2, 5], [6, 7]]
     assert world.unwrapped.tolist() == [[2, 3], [14, 5], [6, -2]]
 
-    world.onlooker = lambda _: balls.move_to((1, 1))
+    world.observer = lambda _: balls.move_to((1, 1))
     refused("move_to is called in the middle of a frame of this world", world.step, FRAME)
 
 
@@ -267,7 +267,7 @@ def test_threads_and_slots_in_another_order_count_alike() -> None:
         for _ in range(20):
             before = world.position.copy()
             world.step(FRAME)
-            summed += world.boundary.seam.nearest(world.position - before)
+            summed += world.boundary.periodic.nearest(world.position - before)
         assert world.unwrapped == pytest.approx(summed, abs=1e-10)
         worlds.append(world)
     assert worlds[0].unwrapped.tolist() == worlds[1].unwrapped.tolist()

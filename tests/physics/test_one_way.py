@@ -142,7 +142,7 @@ def test_it_is_drawn_with_an_arrow_that_turns_with_it() -> None:
 
 
 def test_any_direction_of_gravity_and_a_periodic_room() -> None:
-    # The platform lies across the seam of a room, and gravity points to the right.
+    # The platform lies across the periodic boundary of a room, and gravity points to the right.
     room = pv.Periodic((0, 0), (10, 10), axes="y")
     world = world_with(pv.Segment((6, 8), (6, 12), one_way=(-1, 0)), gravity=(G, 0), boundary=room)
     balls = world.add(position=[(5.0, 9.5), (4.0, 0.5), (8.0, 0.1)], velocity=[(0, -0.1), (0, -0.1), (-8, -0.1)], radius=R)

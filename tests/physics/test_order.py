@@ -24,7 +24,7 @@ def test_the_solutions_on_paper_solve_the_equations(problem: Problem) -> None:
 
     def slope(t: float, y: np.ndarray) -> np.ndarray:
         world.position[0], world.velocity[0] = y[:2], y[2:]
-        state = world._slots
+        state = world._sorted
         world._gather()
         world._force_sum(state, t)
         return np.concatenate((y[2:], state.acceleration[0]))

@@ -37,7 +37,7 @@ def summed(world: pv.World, law: Any) -> Array:
     position, force = world.position.astype(float), np.zeros((len(world), 2))
     for i in range(len(world)):
         for j in range(len(world)):
-            way = world.boundary.seam.nearest(position[i] - position[j])
+            way = world.boundary.periodic.nearest(position[i] - position[j])
             distance = np.hypot(*way)
             if 0 < distance < law.range:
                 force[i] += float(np.ravel(law.force(np.array([distance]), np.array([i]), np.array([j])))[0]) * way / distance

@@ -1,4 +1,4 @@
-"""A periodic room is the same everywhere: what happens across its seam is what happens in its middle."""
+"""A periodic room is the same everywhere: what happens across its periodic boundary is what happens in its middle."""
 
 from typing import Any
 
@@ -70,7 +70,7 @@ def test_pressure_does_not_depend_on_the_stream() -> None:
 
 
 def test_pressure_of_a_pile_without_weight() -> None:
-    """Two circles pressed together across the seam by a constant force f at distance d: the virial is f d."""
+    """Two circles pressed together across the periodic boundary by a constant force f at distance d: the virial is f d."""
     world = _world(contacts=True)
     # Touching once they have come nearer by 0.1 m at most.
     one, other = (world.add(position=(x, 5), radius=0.5, mass=1.0) for x in (7.6, -3.4))
@@ -85,8 +85,8 @@ def _way(way: np.ndarray) -> np.ndarray:
     return np.asarray(way - PERIOD * np.rint(way / PERIOD))
 
 
-def test_a_pile_lies_across_the_seam() -> None:
-    """A row that fills the period rests, and who lies on two of it across the seam rests too: h = sqrt(3) r above."""
+def test_a_pile_lies_across_the_boundary() -> None:
+    """A row that fills the period rests, and who lies on two of it across the boundary rests too: h = sqrt(3) r above."""
     world = _world(gravity=(0, -10), boundary=_room("x", friction=0.5), collisions=pv.Collisions(friction=0.5))
     row = world.add(position=np.column_stack((np.arange(12) - 3.5, np.full(12, 1.5))), radius=0.5)
     top = world.add(position=(8.0, 1.5 + np.sqrt(3) / 2), radius=0.5)
@@ -118,16 +118,16 @@ def test_the_ledger_closes(ends: float | None) -> None:
     for _ in each_frame(world, 180):
         rounds -= np.rint((grains.position[:, 0] - before) / 12.0)
         before = grains.position[:, 0].copy()
-    book = world.ledger
+    ledger = world.ledger
     assert rounds.sum() > 20
-    assert book.seam == pytest.approx(4 * 12.0 * rounds.sum(), rel=1e-9)
-    assert book.total == pytest.approx(world.energy().total, rel=1e-9)
-    assert book.outside == pytest.approx(start, rel=1e-9)
-    assert abs(book.residual) < 0.05 * abs(book.drag)
+    assert ledger.seam == pytest.approx(4 * 12.0 * rounds.sum(), rel=1e-9)
+    assert ledger.total == pytest.approx(world.energy().total, rel=1e-9)
+    assert ledger.outside == pytest.approx(start, rel=1e-9)
+    assert abs(ledger.residual) < 0.05 * abs(ledger.drag)
 
 
 def test_a_chain_around_the_room() -> None:
-    """Closed across the seam it can be stretched by nothing: 12 springs of 0.9 m over 12 m pull with k (1 - 0.9) N for ever."""
+    """Closed across the boundary nothing can stretch it: 12 springs of 0.9 m over 12 m pull with k (1 - 0.9) N for ever."""
     world = _world()
     chain = world.add(position=np.column_stack((np.arange(12) - 3.5, np.full(12, 5.0))), radius=0.2, velocity=(3.0, 0))
     spring = world.links.append(pv.Spring(chain, np.arange(12), (np.arange(12) + 1) % 12, length=0.9, stiffness=20.0))
@@ -138,28 +138,28 @@ def test_a_chain_around_the_room() -> None:
     assert np.hypot(*(ends[:, 1] - ends[:, 0]).T) == pytest.approx(1.0, abs=1e-9)
 
 
-def test_events_and_touches_across_the_seam() -> None:
+def test_events_and_touches_across_the_boundary() -> None:
     """Two that hit each other at x = 8, where the room ends: the point is there, the normal from one to the other."""
     world = _world(collisions=pv.Collisions(restitution=1.0), events=True, contacts=True)
     world.add(position=[(7.0, 5.0), (-3.0, 5.0)], velocity=[(3.0, 0), (-3.0, 0)], radius=0.5, mass=2.0)
     hits: list[Any] = []
-    touches: list[Any] = []
+    records: list[Any] = []
     for _ in each_frame(world, 30):
         hits.extend(world.events.hit.copy())
-        touches.extend(world.contacts.copy())
+        records.extend(world.contacts.copy())
     (hit,) = hits
     assert (hit["a"], hit["b"]) == (0, 1)
     assert hit["speed"] == pytest.approx(6.0)
     assert hit["normal"] == pytest.approx((1, 0))
     assert min(abs(hit["point"][0] - 8.0), abs(hit["point"][0] + 4.0)) < 0.1
     assert hit["point"][1] == pytest.approx(5.0)
-    (touch,) = touches
+    (touch,) = records
     assert touch["impulse"] == pytest.approx(2 * 2.0 * 3.0)
     assert touch["normal"] == pytest.approx((1, 0))
     assert LOWER[0] <= touch["point"][0] < LOWER[0] + PERIOD[0]
 
 
-def test_sleepers_wake_across_the_seam() -> None:
+def test_sleepers_wake_across_the_boundary() -> None:
     world = _world(gravity=(0, -10), boundary=_room("x"), sleep=True)
     sleeper = world.add(position=[(7.8, 1.5), (3.0, 1.5)], radius=0.5)
     world.run(seconds=2.0)
@@ -181,7 +181,7 @@ def test_a_room_that_is_too_small_for_what_is_there() -> None:
 
 
 def test_a_room_that_changes() -> None:
-    """What was near across the seam is not any more, and the other way round."""
+    """What was near across the periodic boundary is not any more, and the other way round."""
     world = _world(collisions=pv.Collisions(restitution=1.0))
     two = world.add(position=[(7.0, 5.0), (-3.0, 5.0)], velocity=[(1.0, 0), (-1.0, 0)], radius=0.5)
     world.run(seconds=0.2)
@@ -210,7 +210,7 @@ def test_what_is_too_far_away_to_have_an_image_is_put_inside(dtype: Any) -> None
     # Beyond 2^53 periods the nearest number is periods away: the grids of cells end before such an image.
     room = pv.Periodic((0, 0), (6, 6))
     far = np.array([[1e17, -3e25], [7e30, 3.0], [-1e37, 1e20]], dtype)
-    inside = room.seam.wrapped(far)
+    inside = room.periodic.wrapped(far)
     assert ((inside >= 0) & (inside < 6)).all()
     assert inside[1, 1] == 3
 
@@ -235,7 +235,7 @@ def meet(law: Any) -> tuple[dict[str, Any], dict[str, Any], Any]:
 
 
 def disc(speed: float) -> tuple[dict[str, Any], dict[str, Any], Any]:
-    """A disc that moves, or not, and hangs over the seam."""
+    """A disc that moves, or not, and hangs over the periodic boundary."""
     made: dict[str, Any] = {"velocity": (-speed, 0.0), "restitution": 1.0}
     return BALL, {"collisions": None}, lambda world, ball, there: world.obstacles.append(pv.Disc(there(0.5, 0.2), 0.6, **made))
 

@@ -8,7 +8,7 @@ import pytest
 from tests.worlds import G, H, each_frame, linked_rows, points
 
 import pyverlet as pv
-from pyverlet.laws.touches import Pushes
+from pyverlet.laws.contact_records import Pushes
 from pyverlet.world.frames import PUSH_OUT
 
 RADIUS = 0.5
@@ -135,9 +135,9 @@ def test_a_pyramid_stands_while_others_come_and_go() -> None:
 
 def looked_at(world: pv.World) -> Pushes:
     """The contacts of a world at rest."""
-    with world.noting_contacts() as touches:
+    with world.recording_contacts() as records:
         world.step(1 / 60)
-    found = touches.pushes()
+    found = records.pushes()
     assert found is not None
     return found
 

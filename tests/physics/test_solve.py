@@ -7,7 +7,7 @@ import pytest
 from tests.worlds import refused
 
 import pyverlet as pv
-from pyverlet.ground.arrays import Floats
+from pyverlet.common.arrays import Floats
 from pyverlet.lab import Equation, order, solve
 from pyverlet.lab.problems import PROBLEMS
 

@@ -138,9 +138,9 @@ LIE: dict[str, Callable[[np.random.Generator, int], Array]] = {
 
 def by_tree(position: Array, mass: Array, softening: float, theta: float = 0.5) -> tuple[Array, float]:
     """Forces (n, 2) and the potential energy, for G = 1."""
-    force, slots = np.zeros_like(position), np.arange(len(mass), dtype=np.int32)
+    force, rows = np.zeros_like(position), np.arange(len(mass), dtype=np.int32)
     motion = core.unit("motion", position.dtype)
-    energy = motion.gravitate(force, position, mass, slots, 1.0, softening, theta, (0, 0, 0, 0), 0, 1)
+    energy = motion.gravitate(force, position, mass, rows, 1.0, softening, theta, (0, 0, 0, 0), 0, 1)
     return force.astype(float), energy
 
 

@@ -153,7 +153,7 @@ def picture_hash(threads: int, frames: int) -> str:
 def test_equal_worlds_give_equal_bytes_for_any_number_of_threads() -> None:
     expected = picture_hash(1, 12)
     assert picture_hash(1, 12) == expected
-    if pv.ground.threads.max_threads() > 1:
+    if pv.common.threads.max_threads() > 1:
         assert picture_hash(2, 12) == expected
 
 

@@ -139,7 +139,7 @@ def test_the_same_bytes_every_time(tmp_path: Path, suffix: str) -> None:
 
     expected = hash_of("a", 1)
     assert hash_of("b", 1) == expected
-    assert hash_of("c", min(2, pv.ground.threads.max_threads())) == expected
+    assert hash_of("c", min(2, pv.common.threads.max_threads())) == expected
 
 
 def test_progress_is_told_after_every_picture(tmp_path: Path) -> None:

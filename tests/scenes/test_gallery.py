@@ -158,10 +158,10 @@ def test_the_car_climbs_its_hills_and_loses_nothing(seed: int) -> None:
     cab, load, way, last = 44, slice(-10, None), 0.0, world.position.astype(float)
     for _ in each_frame(world, 12 * 60):
         now = world.position.astype(float)
-        way += float(world.boundary.seam.nearest(now[[cab]] - last[[cab]])[0, 0])
+        way += float(world.boundary.periodic.nearest(now[[cab]] - last[[cab]])[0, 0])
         last = now
     assert 0.8 * 3.85 * 12 < way < 1.05 * 3.85 * 12
-    away = world.boundary.seam.nearest(last[load] - last[20])
+    away = world.boundary.periodic.nearest(last[load] - last[20])
     assert np.hypot(*away.T).max() < 4.0
     assert world.links.broken.size == 0
 

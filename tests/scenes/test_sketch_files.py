@@ -11,8 +11,8 @@ import pytest
 from tests.worlds import bits_after, refused
 
 import pyverlet as pv
+from pyverlet.common.time_limit import TimeLimit, TooLong
 from pyverlet.data.sweep import open_study
-from pyverlet.ground.time_limit import TimeLimit, TooLong
 from pyverlet.picture import LIGHT, Pen
 from pyverlet.picture.pen import Lettering, Stroke
 from pyverlet.scenes.sketch import Sketch, SketchError

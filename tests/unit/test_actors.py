@@ -162,7 +162,7 @@ def brute(world: pv.World, position: Any, radius: Any, there: int) -> list[int]:
     """Which of these may be added one after the other, circle by circle; `there` of them are already."""
     kept = list(range(there))
     for k in range(there, len(position)):
-        way = world.boundary.seam.nearest(position[kept] - position[k])
+        way = world.boundary.periodic.nearest(position[kept] - position[k])
         if (np.hypot(*way.T) >= radius[kept] + radius[k]).all() and world.is_free(position[k])[0]:
             kept.append(k)
     return kept

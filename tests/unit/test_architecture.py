@@ -1,4 +1,4 @@
-"""The house: each module imports only from lower layers, and `import pyverlet` stays light."""
+"""Layers: each module imports only from lower layers, and `import pyverlet` stays light."""
 
 import ast
 import functools
@@ -12,19 +12,19 @@ import pytest
 from tests.programs import python
 
 import pyverlet
-from pyverlet.ground.versions import ALLOWED, BELOW, LEAST, complaint
+from pyverlet.common.versions import ALLOWED, BELOW, LEAST, complaint
 
 ROOT = Path(pyverlet.__file__).parent
 
-# From the ground up. A room may use those below it; within a room, nothing goes in a circle.
+# From the lowest up. A layer may use those below it; within a layer, nothing goes in a circle.
 LAYERS = (
-    "ground", "core", "state", "laws", "world", "scenes", "data", "lab", "picture", "viewers", "record", "draw",
+    "common", "core", "state", "laws", "world", "scenes", "data", "lab", "picture", "viewers", "record", "draw",
     "cli",
 )  # fmt: skip
-# Rooms on the same floor, which do not know each other, but for these: room -> what it may use beside it.
-BESIDE = {"record": {"viewers"}, "draw": {"viewers"}}
-# Doors up the house, for convenience: methods of one line that load what they name only when called.
-DOORS = {"world/convenience.py": {"record"}, "scenes/__init__.py": {"data"}, "scenes/_scene.py": {"data"}}
+# Packages of one layer do not know each other, but for these: package -> what it may use beside it.
+SAME_LAYER = {"record": {"viewers"}, "draw": {"viewers"}}
+# Convenience methods, of one line, that import what they name only when called.
+CONVENIENCE = {"world/convenience.py": {"record"}, "scenes/__init__.py": {"data"}, "scenes/_scene.py": {"data"}}
 
 MODULES = sorted(path for path in ROOT.rglob("*.py") if path.relative_to(ROOT).as_posix() not in ("__init__.py", "__main__.py"))
 
@@ -59,8 +59,8 @@ def test_layers_look_down() -> None:
     wrong = []
     for path in MODULES:
         own = path.relative_to(ROOT)
-        room = own.parts[0]
-        allowed = {*LAYERS[: LAYERS.index(room) + 1]} | BESIDE.get(room, set()) | DOORS.get(own.as_posix(), set())
+        layer = own.parts[0]
+        allowed = {*LAYERS[: LAYERS.index(layer) + 1]} | SAME_LAYER.get(layer, set()) | CONVENIENCE.get(own.as_posix(), set())
         wrong += [f"{own} imports {name}" for name in imported(path) if name.split(".")[0] not in allowed]
     assert wrong == []
 
@@ -80,8 +80,8 @@ def test_nothing_is_imported_in_a_circle() -> None:
         visit(name, ())
 
 
-def test_doors_open_only_when_called() -> None:
-    for module, names in DOORS.items():
+def test_convenience_methods_import_only_when_called() -> None:
+    for module, names in CONVENIENCE.items():
         assert {name.split(".")[0] for name in imported(ROOT / module, at_once=True)}.isdisjoint(names)
 
 

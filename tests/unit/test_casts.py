@@ -72,7 +72,7 @@ def way_to(thing: Thing, start: Any, heading: Any, size: Any) -> Any:
 
 def all_things(world: pv.World) -> list[tuple[str, int, int, int, list[Thing]]]:
     """Kind, index, category, mask and images, up to one room away, of each."""
-    shifts = world.boundary.seam.images() if world.boundary.seam else np.zeros((1, 2))
+    shifts = world.boundary.periodic.images() if world.boundary.periodic else np.zeros((1, 2))
     found = [
         ("particle", i, int(world.category[i]), int(world.mask[i]), Thing(x[None], x[None], float(world.radius[i])))
         for i, x in enumerate(world.position.astype(float))
@@ -127,7 +127,7 @@ def test_first_hits_are_those_of_brute_force(room: str, dtype: Any, spread: floa
         again = world.ray(start, heading, length, category=category, mask=mask)
         assert all(np.array_equal(a, b, equal_nan=True) for a, b in zip(again, found, strict=True))
 
-    inside, things = world.boundary.seam.wrapped(start), all_things(world)
+    inside, things = world.boundary.periodic.wrapped(start), all_things(world)
     ways = [np.min([way_to(part, inside, heading, size) for part in parts], axis=0) for *_, parts in things]
     ways += list(walls_of(world, inside, heading, size).T)
     about = [each[:4] for each in things] + [("wall", k, *kinds(world.boundary)) for k in range(len(ways) - len(things))]
@@ -152,7 +152,7 @@ def test_first_hits_are_those_of_brute_force(room: str, dtype: Any, spread: floa
             continue
         # The point is on the rim of the thing, and from there the normal leads straight away from it.
         place, step = found.position[q], 1e-5 * found.normal[q]
-        moved = world.boundary.seam.nearest(inside[q] + best[q] * heading[q] - size[q] * found.normal[q] - place)
+        moved = world.boundary.periodic.nearest(inside[q] + best[q] * heading[q] - size[q] * found.normal[q] - place)
         assert moved == pytest.approx(np.zeros(2), abs=NEAR)
         if best[q] > 0 and about[named[0]][0] != "wall":
             parts = things[named[0]][4]

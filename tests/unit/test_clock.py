@@ -7,8 +7,8 @@ import pytest
 
 import pyverlet as pv
 from pyverlet import core
-from pyverlet.ground import progress
-from pyverlet.ground.progress import Progress
+from pyverlet.common import progress
+from pyverlet.common.progress import Progress
 
 
 @pytest.mark.parametrize("drawn", [10, 24, 30, 60, 75, 144, 240])

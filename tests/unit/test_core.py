@@ -13,12 +13,12 @@ import numpy as np
 import pytest
 from tests.programs import python
 from tests.uncompiled import UNCOMPILED
-from tests.worlds import HEARD, WORLDS, each_frame, grid, noted, of_ones_own
+from tests.worlds import RECORDING, WORLDS, each_frame, grid, noted, of_ones_own
 
 import pyverlet as pv
 from pyverlet import core
+from pyverlet.common.errors import CoreError
 from pyverlet.core import joining
-from pyverlet.ground.errors import CoreError
 from pyverlet.viewers.frames import quantise
 
 LOW = "from pyverlet.core.low import"
@@ -161,9 +161,9 @@ def results(monkeypatch: pytest.MonkeyPatch) -> Iterator[Callable[..., list[Any]
         monkeypatch.setattr(core, "_load", lambda _, unit: load(unit))
         core.unit.cache_clear()
         make, frames = SMALL[name]
-        world, seen = make(dtype=dtype, **HEARD), list[Any]()
+        world, seen = make(dtype=dtype, **RECORDING), list[Any]()
         if name == "watched":
-            world.onlooker = lambda moment: seen.extend(moment.look())
+            world.observer = lambda moment: seen.extend(moment.look())
         found: list[Any] = [noted(world) for _ in each_frame(world, frames)]
         world.remove(len(world) - 1)
         found += [np.asarray(each).tobytes() for each in (*seen, *(answers(world) if seen else ()))]

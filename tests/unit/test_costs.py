@@ -13,7 +13,7 @@ import pytest
 from tests.worlds import grid
 
 import pyverlet as pv
-from pyverlet.ground.constants import KNOWN_FROM
+from pyverlet.common.constants import KNOWN_FROM
 from pyverlet.laws.collisions import find_contacts
 from pyverlet.state import neighbours
 from pyverlet.world import queries
@@ -174,7 +174,7 @@ def fastest(act: Callable[[], object]) -> float:
     return min(timeit.repeat(act, repeat=15, number=1))
 
 
-def in_turn(*acts: Callable[[], object], turns: int = 40) -> list[float]:
+def exclusive(*acts: Callable[[], object], turns: int = 40) -> list[float]:
     """Seconds that each takes, one after the other again and again: medians, for machines that are busy with something else."""
     took = [[timeit.timeit(act, number=1) for act in acts] for _ in range(turns)]
     return np.median(took, axis=0).tolist()  # type: ignore[no-any-return]
@@ -207,16 +207,16 @@ def test_reading_a_world_costs_less_than_its_step(count: int, options: dict[str,
     # All in turn with steps, for the first after each step has to find out. They are about half of one; of ten discs, nearly one.
     world = heap(count, contacts=True, **options)
     for name, read in READINGS.items():
-        step, reading = in_turn(lambda: world.step(DT), lambda read=read: read(world))  # type: ignore[misc]
+        step, reading = exclusive(lambda: world.step(DT), lambda read=read: read(world))  # type: ignore[misc]
         assert reading < (2 if count == 10 else 1) * step, name
 
 
 def test_a_frame_that_notes_contacts_costs_little_more_than_one_that_does_not() -> None:
     # 1.1 times as much; it was 17 to 100 times, as each substep was a call.
-    plain, noting = heap(100), heap(100, contacts=True)
-    without, with_it = in_turn(lambda: plain.step(DT), lambda: noting.step(DT))
+    plain, records_contacts = heap(100), heap(100, contacts=True)
+    without, with_it = exclusive(lambda: plain.step(DT), lambda: records_contacts.step(DT))
     assert with_it < 1.6 * without
-    assert plain.state_hash() == noting.state_hash()
+    assert plain.state_hash() == records_contacts.state_hash()
 
 
 @pytest.mark.parametrize(("room", "scale"), [(pv.Open(), 1.0), (pv.Open(), 1e-6), (pv.Periodic((-3, -3), (5, 4)), 1.0)])
@@ -231,7 +231,7 @@ def test_overlaps_are_those_that_all_pairs_have(room: pv.Boundary, scale: float,
     world.links.append(pv.Stick(group, 0, 100, length=scale, collide=False))
     pairs = find_contacts(world._state)
     pairs = pairs[~((pairs == (0, 100)).all(axis=1))]
-    way = world.boundary.seam.nearest(world.position[pairs[:, 1]] - world.position[pairs[:, 0]])
+    way = world.boundary.periodic.nearest(world.position[pairs[:, 1]] - world.position[pairs[:, 0]])
     depth = 1 - np.hypot(*way.T) / world.radius[pairs].sum(axis=1)
     overlap = world.overlap()
     assert overlap.contacts == len(pairs) > 20
@@ -354,7 +354,7 @@ def test_who_has_flown_away_costs_a_tree_and_a_fluid_nothing() -> None:
             world.add(position=there, radius=0.05, mass=10.0)
             world.forces.append(force)
             worlds.append(world)
-    tree, fluid, tree_far, fluid_far = in_turn(*(partial(world.step, DT) for world in worlds), turns=7)
+    tree, fluid, tree_far, fluid_far = exclusive(*(partial(world.step, DT) for world in worlds), turns=7)
     assert tree_far < 4 * tree
     assert fluid_far < 4 * fluid
 

@@ -11,7 +11,7 @@ import pytest
 from tests import worlds
 
 import pyverlet as pv
-from pyverlet.ground.fields import Field
+from pyverlet.common.fields import Field
 
 KINDS: dict[str, Any] = {
     "bool": np.array([True, False, True]), "int8": np.array([1, -2, 3], np.int8),

@@ -108,7 +108,7 @@ def test_mobility_is_that_of_the_energy(kind: Any) -> None:
         slope[particle, axis] = (world.links.energy(corners + way) - world.links.energy(corners - way)) / (2 * step)
     expected = (slope**2).sum(axis=1) @ (1 / mass)
     assert expected > 0.01
-    found = pool.mobility(corners, 1 / mass, world._state.seam)
+    found = pool.mobility(corners, 1 / mass, world._state.periodic)
     assert 2 * 4.0 * world.links.energy() * found == pytest.approx(expected, rel=1e-8)
 
 

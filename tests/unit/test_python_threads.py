@@ -171,7 +171,7 @@ def test_a_frame_is_not_to_be_changed_from_within() -> None:
                 change()
             said.append(str(refused.value))
 
-    world.onlooker = meddle
+    world.observer = meddle
     world.step(1 / 60)
     assert {text.split()[0] for text in said} == {"step", "add", "remove", "save"}
     assert (world.frames, len(world)) == (1, 16)

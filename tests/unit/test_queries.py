@@ -10,7 +10,7 @@ from tests.worlds import thing_of
 
 import pyverlet as pv
 from pyverlet.laws.obstacles import ObstacleArrays, Obstacles
-from pyverlet.state.seam import Seam
+from pyverlet.state.periodicity import Periodicity
 
 AXES = ("xy", "x", "y")
 LOWER, PERIOD = np.array([-3.0, 2.0]), np.array([10.0, 7.0])
@@ -49,7 +49,7 @@ def points_for(rng: np.random.Generator, world: pv.World, count: int = 25) -> An
 
 def apart(points: Any, world: pv.World) -> Any:
     """(q, n) squares of distances; in a periodic room to the nearest images."""
-    offset, period = world.position.astype(float) - points[:, None], np.array(world.boundary.seam.period)
+    offset, period = world.position.astype(float) - points[:, None], np.array(world.boundary.periodic.period)
     offset -= period * np.rint(offset / np.where(period > 0, period, np.inf))
     return offset[..., 0] * offset[..., 0] + offset[..., 1] * offset[..., 1]
 
@@ -90,7 +90,7 @@ def test_regions_equal_brute_force(kind: tuple[int, int, str]) -> None:
     low, high = middle - rng.uniform(0, 6, (25, 2)), middle + rng.uniform(0, 6, (25, 2))
     low[:4, 0], high[:4, 0], size[:4] = middle[:4, 0] - 30, middle[:4, 0] + 30, 30  # several periods
     in_box = np.ones((25, len(world)), bool)
-    for axis, period in enumerate(world.boundary.seam.period):  # a particle is in a region if one of its images is; once
+    for axis, period in enumerate(world.boundary.periodic.period):  # a particle is in a region if one of its images is; once
         images = [world.position[:, axis] + k * period for k in (range(-9, 10) if period else (0,))]
         in_box &= np.any([(low[:, axis, None] <= x) & (x <= high[:, axis, None]) for x in images], axis=0)
     assert world.in_box(low, high).tolist() == np.argwhere(in_box).tolist()
@@ -128,12 +128,12 @@ def test_answers_name_the_users_particles_while_the_world_runs() -> None:
 
 
 @pytest.mark.parametrize("axes", AXES)
-def test_rays_go_on_through_the_seam(axes: str) -> None:
+def test_rays_go_on_through_the_boundary(axes: str) -> None:
     """Against the images in eleven by eleven rooms: |o + s d - c| = r of origin o, direction d, circle c, the smallest s >= 0."""
     world, rng = make((60, 9, axes))
     start, angle, length = rng.uniform(LOWER, LOWER + PERIOD, (30, 2)), rng.uniform(0, 2 * np.pi, 30), 25.0
     heading = np.column_stack((np.cos(angle), np.sin(angle)))
-    period = np.array(world.boundary.seam.period)
+    period = np.array(world.boundary.periodic.period)
     shift = np.array([(i, j) for i in range(-5, 6) for j in range(-5, 6)]) * period
     image = (world.position[:, None] + shift).reshape(-1, 2)
     radius, owner = np.repeat(world.radius, len(shift)), np.repeat(np.arange(60), len(shift))
@@ -204,11 +204,11 @@ def test_the_first_of_those_that_have_a_point_inside_covers_it() -> None:
     obstacles = Obstacles()
     obstacles.extend(shapes(chance))
     points = chance.uniform(-21, 21, (2000, 2))
-    arrays = ObstacleArrays(obstacles, Seam(-20.0, -20.0, 40.0, 40.0))
+    arrays = ObstacleArrays(obstacles, Periodicity(-20.0, -20.0, 40.0, 40.0))
     inside = np.zeros((len(points), len(obstacles)), bool)
     for shift in [(x, y) for x in (-40, 0, 40) for y in (-40, 0, 40)]:
         for k, each in enumerate(obstacles):
-            inside[:, k] |= thing_of(each).image(np.array(shift)).gap(arrays.seam.wrapped(points)) < 0
+            inside[:, k] |= thing_of(each).image(np.array(shift)).gap(arrays.periodic.wrapped(points)) < 0
     expected = np.where(inside.any(axis=1), inside.argmax(axis=1), -1)
     assert (expected >= 0).sum() > 80
     assert arrays.covering(points).tolist() == expected.tolist()

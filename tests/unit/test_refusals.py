@@ -11,7 +11,7 @@ import pytest
 from tests.worlds import refused
 
 import pyverlet as pv
-from pyverlet.ground.checked import Checked
+from pyverlet.common.checked import Checked
 from pyverlet.lab.figures import check_can_plot
 from pyverlet.viewers.window import Window
 

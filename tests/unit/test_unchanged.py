@@ -13,8 +13,8 @@ from tests.worlds import grid
 
 import pyverlet as pv
 from pyverlet import scenes
-from pyverlet.ground import memory
-from pyverlet.ground.constants import KNOWN_FROM
+from pyverlet.common import memory
+from pyverlet.common.constants import KNOWN_FROM
 from pyverlet.state.unchanged import Unchanged
 
 
@@ -110,11 +110,11 @@ def test_what_no_one_has_touched_is_not_copied_in_again_when_others_come_and_go(
     world.step(0.1)
     world.remove([0, 3000])
     world.step(0.1)
-    assert not world._slots.copied
+    assert not world._sorted.copied
     come = world.add(position=[(-3, -3), (-5, -3)], velocity=(-1, 0), radius=0.4)
     world.step(0.1)
-    assert not world._slots.copied
-    assert np.array_equal(world._slots.where(), world.position)
+    assert not world._sorted.copied
+    assert np.array_equal(world._sorted.where(), world.position)
     assert come.position == pytest.approx(np.array([(-3.1, -3), (-5.1, -3)]))
     y, x = divmod(2999, SIDE)
     assert world.position[2998] == pytest.approx((x, y))

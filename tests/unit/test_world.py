@@ -9,7 +9,7 @@ import pytest
 from tests.worlds import grid, refused
 
 import pyverlet as pv
-from pyverlet.ground.threads import max_threads
+from pyverlet.common.threads import max_threads
 from pyverlet.scenes import report
 
 
@@ -165,7 +165,7 @@ class Explode:
 
     def apply(self, state: Any, t: float) -> None:
         if t > 0.5:
-            state.force[state.slots_of(3)] = np.nan
+            state.force[state.sorted_index(3)] = np.nan
 
 
 def test_a_non_finite_state_stops_the_world_and_keeps_the_last_good_frame() -> None:

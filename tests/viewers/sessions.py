@@ -48,7 +48,7 @@ def after(session: Session, *commands: Command) -> Frame:
     """The frame after these were obeyed, one after the other, in a session that this thread turns."""
     for command in commands:
         session.submit(command)
-        session.turn()
+        session.run_once()
     return session.latest
 
 

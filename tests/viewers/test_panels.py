@@ -114,7 +114,7 @@ def test_a_hand_works_in_the_panel_it_came_down_on() -> None:
     assert first.forces == []
 
 
-# ---- Pictures of periodic rooms: what reaches through a seam is on both sides, in pixels, on the page and in a film of one
+# ---- Pictures of periodic rooms: what reaches through a boundary is on both sides, in pixels, on the page and in a film of one
 # file ----
 
 
@@ -139,10 +139,10 @@ def _world(axes: str = "xy") -> pv.World:
 )
 def test_copies(axes: str, wanted: set[tuple[float, float]]) -> None:
     world = _world(axes)
-    owner, place = periodic_images.copies(np.array(PLACES), world.radius, world.boundary.seam)
+    owner, place = periodic_images.copies(np.array(PLACES), world.radius, world.boundary.periodic)
     assert {tuple(row) for row in np.round(place, 6).tolist()} == wanted
     way = place - np.array(PLACES)[owner]
-    period = np.array(world.boundary.seam.period)
+    period = np.array(world.boundary.periodic.period)
     assert np.abs(way) == pytest.approx(np.where(np.abs(way) > 1, period, 0.0))
 
 
@@ -156,7 +156,7 @@ def test_a_frame_has_copies_on_its_grid() -> None:
     place = grid / 65535 * (x1 - x0, y1 - y0) + (x0, y0)
     assert place == pytest.approx(frame.copies[1], abs=(x1 - x0) / 65535)
     assert sorted(owner.tolist()) == [0, 1, 1, 1, 3]
-    assert len(frame.segments[0]) == 2  # the link through the seam, from both of its ends
+    assert len(frame.segments[0]) == 2  # the link through the periodic boundary, from both of its ends
 
 
 def _where_red(picture: NDArray[Any]) -> NDArray[Any]:
@@ -177,7 +177,7 @@ def test_pictures_have_both_halves() -> None:
 @pytest.mark.slow
 @pytest.mark.parametrize("size", [1, 300])
 def test_the_gas_on_the_page(page: Page, program: Serve, size: int) -> None:
-    """Its graph is there, and says what theory does; its circles are drawn, those at the seam twice."""
+    """Its graph is there, and says what theory does; its circles are drawn, those at the periodic boundary twice."""
     visit(page, program("gas", size).address)
     expect(page.get_by_test_id("graph")).to_be_visible()
     expect(page.get_by_test_id("graph")).to_contain_text("equation of state")

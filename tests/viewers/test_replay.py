@@ -61,8 +61,8 @@ def test_what_was_done_between_substeps_is_done_there_again(tmp_path: Path) -> N
         view_state = journal.view_state(Presentation("crowd", Panels.of(crowd())))
         looks: list[float] = []
 
-        def observer(moment: Any) -> None:
-            looks.append(moment.time)
+        def observer(snapshot: Any) -> None:
+            looks.append(snapshot.time)
             if len(looks) % 5 == 0:
                 view_state.do(Drag(0, 0.1 * len(looks), 3.0, 9.0))
             if len(looks) == 23:

@@ -11,10 +11,10 @@ import pytest
 
 import pyverlet as pv
 from pyverlet.laws.forces import Push
-from pyverlet.state.slots import Slots
+from pyverlet.state.sorted_state import SortedState
 from pyverlet.viewers.commands import Command, Drag, Pause, Poke, Release, Reset, SetGravity, SetSubsteps, Step
 from pyverlet.viewers.pointers import LEASH
-from pyverlet.viewers.session import KEEN, Session
+from pyverlet.viewers.session import VELOCITY_FRAMES, Session
 
 from .sessions import Treacle, after, wait_until
 
@@ -94,22 +94,27 @@ def test_run_steps_in_the_calling_thread_until_stopped(world: pv.World, callers:
     assert session.latest.status.paused
 
 
-def poison(state: Slots) -> None:
+def poison(state: SortedState) -> None:
     state.force[:] = np.nan
 
 
-def fail(state: Slots) -> None:
+def fail(state: SortedState) -> None:
     raise KeyError("wind")
 
 
 @pytest.mark.parametrize(("wrong", "said", "logged"), [(poison, "non-finite", False), (fail, "KeyError: 'wind'", True)])
 def test_an_error_stops_the_stepping_is_told_and_reset_cures_it(
-    session: Session, world: pv.World, caplog: pytest.LogCaptureFixture, wrong: Callable[[Slots], None], said: str, logged: bool
+    session: Session,
+    world: pv.World,
+    caplog: pytest.LogCaptureFixture,
+    wrong: Callable[[SortedState], None],
+    said: str,
+    logged: bool,
 ) -> None:
     class Wrong:
         velocity_dependent = False
 
-        def apply(self, state: Slots, t: float) -> None:
+        def apply(self, state: SortedState, t: float) -> None:
             wrong(state)
 
     wait_until(lambda: session.latest.status.frames > 3)
@@ -213,7 +218,7 @@ class Diary(Treacle):
         self.gravity: list[tuple[int, float]] = []
         self.pokes: list[tuple[int, float]] = []
 
-    def apply(self, state: Slots, t: float) -> None:
+    def apply(self, state: SortedState, t: float) -> None:
         super().apply(state, t)
         self.gravity.append((self.world.frames, self.world.gravity[1]))
         self.pokes += [(self.world.frames, force.center[0]) for force in self.world.forces if isinstance(force, Push)]
@@ -335,4 +340,4 @@ def test_velocities_are_made_for_a_while_after_a_viewer_has_asked(world: pv.Worl
     first = session.latest
     session.take(replace(first, seq=2), velocity=True)
     session.take(replace(first, seq=3))  # another tab
-    assert (session._taken, session._velocity_until) == (3, 2 + KEEN)
+    assert (session._taken, session._velocity_until) == (3, 2 + VELOCITY_FRAMES)

@@ -29,13 +29,13 @@ def shown(world: pv.World) -> Iterator[Window]:
 
 def press(window: Window, key: int) -> None:
     pygame.event.post(pygame.event.Event(pygame.KEYDOWN, key=key, mod=0, unicode="", scancode=0))
-    window.turn()
+    window.run_once()
 
 
 def mouse(window: Window, kind: int, pixel: Any, **values: Any) -> None:
     pos = tuple(round(float(value)) for value in pixel)
     pygame.event.post(pygame.event.Event(kind, pos=pos, **values))
-    window.turn()
+    window.run_once()
 
 
 @pytest.mark.parametrize("size", [(424, 424), (200, 100)])
@@ -43,22 +43,22 @@ def test_the_screen_shows_the_painters_pixels_whatever_its_size(shown: Window, w
     if size != (424, 424):
         pygame.display.set_mode(size, pygame.RESIZABLE)
         pygame.event.post(pygame.event.Event(pygame.VIDEORESIZE, w=size[0], h=size[1], size=size))
-    shown.turn()
+    shown.run_once()
     screen = pygame.surfarray.array3d(pygame.display.get_surface()).swapaxes(0, 1)
     assert (screen == world.to_image(size=size)).all()
 
 
 def test_it_runs_in_real_time_and_space_pauses_and_resumes(shown: Window, world: pv.World) -> None:
-    shown.turn()
+    shown.run_once()
     assert world.frames == 0
     press(shown, pygame.K_SPACE)
     assert not shown.paused
     for _ in range(5):
-        shown.turn()
+        shown.run_once()
     assert world.frames >= 4  # each turn waits for the next frame to be due
     press(shown, pygame.K_SPACE)
     frames = world.frames
-    shown.turn()
+    shown.run_once()
     assert world.frames == frames
 
 
@@ -88,12 +88,12 @@ def test_closing_ends_run_and_lets_go(shown: Window, world: pv.World) -> None:
 
 
 def test_a_drag_lifts_the_circle(shown: Window, world: pv.World) -> None:
-    shown.turn()
+    shown.run_once()
     start = shown._seen().to_screen(world.position[4])
     mouse(shown, pygame.MOUSEBUTTONDOWN, start, button=1)
     mouse(shown, pygame.MOUSEMOTION, start - (0, 100), rel=(0, -100), buttons=(1, 0, 0))
     shown._session.submit(Step(60))
-    shown.turn()
+    shown.run_once()
     assert world.position[4, 1] > 2.0
     assert np.delete(world.position[:, 1], 4).max() < 0.6
     mouse(shown, pygame.MOUSEBUTTONUP, start, button=1)
@@ -102,18 +102,18 @@ def test_a_drag_lifts_the_circle(shown: Window, world: pv.World) -> None:
 
 def test_a_poke_pushes_away(shown: Window, world: pv.World, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(pygame.key, "get_mods", lambda: pygame.KMOD_LSHIFT)
-    shown.turn()
+    shown.run_once()
     mouse(shown, pygame.MOUSEBUTTONDOWN, shown._seen().to_screen((0.3, 0.5)), button=1)
     shown._session.submit(Step(3))
-    shown.turn()
+    shown.run_once()
     assert world.velocity[4, 0] < -0.1
 
 
 def test_the_wheel_zooms_the_right_button_moves_and_f_fits(shown: Window) -> None:
-    shown.turn()
+    shown.run_once()
     whole = shown._seen()
     pygame.event.post(pygame.event.Event(pygame.MOUSEWHEEL, x=0, y=2, flipped=False))
-    shown.turn()
+    shown.run_once()
     assert shown._seen().scale == pytest.approx(1.15**2 * whole.scale)
     left = shown._seen().left
     mouse(shown, pygame.MOUSEMOTION, (9, 9), rel=(30, 0), buttons=(0, 0, 1))
@@ -123,7 +123,7 @@ def test_the_wheel_zooms_the_right_button_moves_and_f_fits(shown: Window) -> Non
 
 
 def test_the_title_bar_tells_the_numbers(shown: Window) -> None:
-    shown.turn()
+    shown.run_once()
     assert pygame.display.get_caption()[0] == "pyverlet: paused, 9 circles, 0.00 s, physics 0.0 ms"
 
 
@@ -132,7 +132,7 @@ def test_an_error_stops_the_world_not_the_window(shown: Window, world: pv.World)
     press(shown, pygame.K_PERIOD)
     assert "particle 2 turned non-finite" in str(shown.error)
     shown._caption_due = 0.0
-    shown.turn()
+    shown.run_once()
     assert "particle 2" in pygame.display.get_caption()[0]
     press(shown, pygame.K_r)
     assert str(shown.error) == "None"

@@ -14,8 +14,8 @@ from pyverlet.cli import _lab, _saved  # noqa: F401  (they register their comman
 from pyverlet.cli import _print as out
 from pyverlet.cli._app import app
 from pyverlet.cli._print import FAILED
-from pyverlet.ground import loading
-from pyverlet.ground.errors import InputError, Interrupted, PyverletError
+from pyverlet.common import loading
+from pyverlet.common.errors import InputError, Interrupted, PyverletError
 
 __all__ = ["app", "main"]
 

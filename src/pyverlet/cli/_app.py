@@ -14,10 +14,10 @@ from pyverlet.cli import _options as options
 from pyverlet.cli import _print as out
 from pyverlet.cli import _sweep
 from pyverlet.cli._options import integrators, single
+from pyverlet.common import checks
+from pyverlet.common.errors import InputError
+from pyverlet.common.progress import Progress
 from pyverlet.data.trajectory import Trajectory
-from pyverlet.ground import checks
-from pyverlet.ground.errors import InputError
-from pyverlet.ground.progress import Progress
 from pyverlet.laws.integrators import Integrator
 from pyverlet.picture import DARK, Colouring, Fixed, Theme
 from pyverlet.scenes import SCENES, Scene, Settings, report, sketch

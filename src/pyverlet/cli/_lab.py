@@ -14,9 +14,9 @@ from pyverlet.cli import _options as options
 from pyverlet.cli import _print as out
 from pyverlet.cli._app import DEFAULT_DT, app, check_app
 from pyverlet.cli._options import imported, integrators, what
-from pyverlet.ground import checks
-from pyverlet.ground.errors import InputError, PyverletError
-from pyverlet.ground.progress import Progress
+from pyverlet.common import checks
+from pyverlet.common.errors import InputError, PyverletError
+from pyverlet.common.progress import Progress
 from pyverlet.lab import fuzz, physics, table
 from pyverlet.laws.integrators import BY_NAME
 from pyverlet.scenes import report
@@ -37,7 +37,7 @@ Plot = Annotated[Path | None, options.file("Write a figure (.png, .pdf or .svg).
 
 def _counts(text: str) -> list[int]:
     """Integers from a list with commas."""
-    counts = [checks.whole("substeps", options.whole(part.strip())) for part in text.split(",")]
+    counts = [checks.integer("substeps", options.whole(part.strip())) for part in text.split(",")]
     if twice := [count for count in counts if counts.count(count) > 1]:
         raise InputError(f"substeps names {twice[0]} twice; allowed is each once")
     return counts

@@ -10,8 +10,8 @@ from typing import Annotated, Any, Literal
 import numpy as np
 import typer
 
-from pyverlet.ground.errors import InputError
-from pyverlet.ground.guess import did_you_mean
+from pyverlet.common.errors import InputError
+from pyverlet.common.guess import did_you_mean
 from pyverlet.laws.collisions import BruteForce, Fast
 from pyverlet.laws.integrators import BY_NAME, Integrator
 from pyverlet.viewers import DEFAULT_PORT

@@ -14,9 +14,9 @@ from pyverlet.cli import _options as options
 from pyverlet.cli import _print as out
 from pyverlet.cli._app import app, picture_style
 from pyverlet.cli._options import single
-from pyverlet.ground.errors import InputError
-from pyverlet.ground.outside import file_errors
-from pyverlet.ground.progress import Progress
+from pyverlet.common.errors import InputError
+from pyverlet.common.outside import file_errors
+from pyverlet.common.progress import Progress
 from pyverlet.picture import DARK, LIGHT
 from pyverlet.picture.colour import COLOURINGS
 from pyverlet.scenes.sketch import SUFFIX

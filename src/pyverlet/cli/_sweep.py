@@ -12,9 +12,9 @@ import typer
 from pyverlet.cli import _options as options
 from pyverlet.cli import _print as out
 from pyverlet.cli._options import imported, integrator
+from pyverlet.common.errors import InputError
 from pyverlet.data.sweep import Measure, Study, open_study
 from pyverlet.data.sweep import sweep as make
-from pyverlet.ground.errors import InputError
 from pyverlet.viewers.protocol import finite
 
 _SHOWN, _MOST = 20, 1_000_000

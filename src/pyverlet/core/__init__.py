@@ -21,8 +21,8 @@ from typing import Any, Final
 
 import numpy as np
 
-from pyverlet.ground import loading
-from pyverlet.ground.errors import CoreError
+from pyverlet.common import loading
+from pyverlet.common.errors import CoreError
 
 VARIANTS: Final = {"x86_64_v4": 4, "x86_64_v3": 3, "baseline": 0}
 """Sub-folder with compiled units, the fastest first -> level of x86-64 that it needs."""

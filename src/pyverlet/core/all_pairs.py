@@ -24,7 +24,7 @@ def has_nearest(c: cython.pointer(Cells), a: int64_t, b: int64_t) -> cython.bint
 
 @kernel
 def list_all(
-    c: cython.pointer(Cells), ls: cython.pointer(Lists), inverse_mass: cython.pointer(real), found: int64_t, room: int64_t
+    c: cython.pointer(Cells), ls: cython.pointer(Lists), inverse_mass: cython.pointer(real), found: int64_t, capacity: int64_t
 ) -> int64_t:
     """Write all pairs from `found` on; returns the end, even if beyond the room.
 
@@ -35,11 +35,11 @@ def list_all(
     a: int64_t
     for step in range(1, c.count):
         for a in range(c.count - step):
-            if ls.picky and not may_touch(c, ls, inverse_mass, a, a + step):
+            if ls.tests_pairs and not may_touch(c, ls, inverse_mass, a, a + step):
                 continue
             if periodic and not has_nearest(c, a, a + step):
                 continue
-            if found < room:
+            if found < capacity:
                 ls.raw_i[found] = cython.cast(uint32_t, a)
                 ls.raw_j[found] = cython.cast(uint32_t, a + step)
             found += 1

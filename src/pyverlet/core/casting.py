@@ -51,7 +51,7 @@ NO_WAY = cython.declare(cython.double, 1e-300)
 RAYS = cython.declare(cython.Py_ssize_t, 256)
 """Rays per work item of a thread."""
 
-ROOMS = cython.declare(cython.int, 100)
+MOST_PERIODS = cython.declare(cython.int, 100)
 """Most periods that a ray passes through; in some directions it would go on for ever without a hit."""
 
 Cast = cython.struct(
@@ -205,7 +205,7 @@ def cast_one(j: cython.pointer(Cast), q: cython.Py_ssize_t) -> cython.void:
     r.size, r.kind, r.index, r.segment = j.size[q * j.step_size], NOTHING, -1, 0
     gone: cython.double = 0.0  # distance in the periods before
     k: cython.int
-    for _ in range(ROOMS):
+    for _ in range(MOST_PERIODS):
         ahead: cython.double = min(to_edge(r.x, r.dx, j.low_x, j.period_x), to_edge(r.y, r.dy, j.low_y, j.period_y))
         ahead = r.best = min(ahead, length - gone)
         for k in range(j.first_wall, j.walls_end):

@@ -27,11 +27,11 @@ from cython.cimports.lanes import (
 from cython.cimports.libc.stdint import int32_t
 from cython.cimports.team import team_give_number, team_take_number
 
-from pyverlet.core.hearing import hear_meeting
+from pyverlet.core.event_recording import record_approach
 from pyverlet.core.impacts import resolve_impacts
 from pyverlet.core.kernels import inlined, kernel
 from pyverlet.core.pairs_in_lanes import Motion, apply_impulses, arm_of, clamped, held_roll, motion_of, slip_of
-from pyverlet.core.rebounds import IN_LIST, REBOUND, VOLLEY
+from pyverlet.core.rebounds import IN_LIST, REBOUND, STAMP
 from pyverlet.core.step import ELASTIC, NEAR, TOUCHED, Step
 from pyverlet.core.surfaces import bounce_surfaces, has_rebounds, meets_none
 from pyverlet.core.warm_start import Normals, measure_pairs, turned_normals
@@ -47,7 +47,7 @@ the smaller radius: links would pass it on, and nets exploded."""
 SLOW = cython.declare(real, 0.1)
 LINKED_DEEP = cython.declare(real, 0.8)
 """Overlapping pairs that separate more slowly than this fraction of the springs' speed are pushed, too. If forces may press them
-together again, only beyond DEEP, or heaps would be less calm; in worlds with links beyond LINKED_DEEP, or rag dolls exploded."""
+together again, only beyond DEEP, or heaps would rest less; in worlds with links beyond LINKED_DEEP, or rag dolls exploded."""
 
 STRAIGHT_WAY = cython.declare(real, 0.1)
 """Circles without restitution and friction also have impacts if their approach per substep, over the distance, exceeds this."""
@@ -118,7 +118,7 @@ def fast_ones(
 
 
 @kernel
-def note_hits(w: cython.pointer(Step), k: cython.Py_ssize_t, bits: cython.int, place: cython.Py_ssize_t) -> cython.Py_ssize_t:
+def store_hits(w: cython.pointer(Step), k: cython.Py_ssize_t, bits: cython.int, place: cython.Py_ssize_t) -> cython.Py_ssize_t:
     """Write to `hit`, from `place` on, those of the eight pairs from k on whose bits are set; returns their number.
 
     Pairs that carry load are left out, unless another impact has thrown one particle at the other.
@@ -152,7 +152,7 @@ def find_hits(w: cython.pointer(Step), s: cython.Py_ssize_t, at: cython.Py_ssize
             ny: lanes = load(w.normal_y, k)
             fast: mask = fast_ones(w, k, (m.vx - m.ux) * nx + (m.vy - m.uy) * ny, depth, nx, ny, False, True)
             if any_lane(fast):
-                count += note_hits(w, k, bits_of(fast), at + count)
+                count += store_hits(w, k, bits_of(fast), at + count)
     return count
 
 
@@ -160,7 +160,7 @@ def find_hits(w: cython.pointer(Step), s: cython.Py_ssize_t, at: cython.Py_ssize
 def list_rebound(w: cython.pointer(Step), s: cython.Py_ssize_t, k: cython.Py_ssize_t) -> cython.void:
     """List pair k of group s as an impact of linked particles, if it is one and not listed yet."""
     row: cython.pointer(cython.double) = w.pair_rebound
-    if row[REBOUND * k + VOLLEY] == w.volley and row[REBOUND * k + IN_LIST] == 0:
+    if row[REBOUND * k + STAMP] == w.stamp and row[REBOUND * k + IN_LIST] == 0:
         row[REBOUND * k + IN_LIST] = 1
         w.rebound_pair[w.begin[s] + w.rebounding[s]] = k
         w.rebounding[s] += 1
@@ -252,10 +252,10 @@ def solve(
             after = choose(loaded, after, choose(above(speed, parts), zero, choose(above(depth, -near_of(w, k)), after, zero)))
             fast: mask = fast_ones(w, k, speed, depth, nx, ny, True, False)
             if any_lane(fast):
-                count += note_hits(shared, k, bits_of(fast), at + count)
+                count += store_hits(shared, k, bits_of(fast), at + count)
                 after = choose(fast, before, after)
-            if own.listening:
-                hear_meeting(w, k, speed, nx, ny, before, after)
+            if own.records_events:
+                record_approach(w, k, speed, nx, ny, before, after)
         else:
             along_x: lanes = m.vx - m.ux
             along_y: lanes = m.vy - m.uy
@@ -308,7 +308,7 @@ def sweep(
 def solve_contacts(w: cython.pointer(Step), s: cython.Py_ssize_t, stage: cython.int) -> cython.bint:
     """Solve the soft contacts of group s, then its impacts; returns whether there were any."""
     number: cython.int = team_take_number(w.team)
-    at: cython.Py_ssize_t = number * w.lists.scratch_room
+    at: cython.Py_ssize_t = number * w.lists.scratch_capacity
     hits: cython.Py_ssize_t = sweep(w, s, at, True, True, False)
     more: cython.int = MORE_SWEEPS if w.crowded[s] and not w.linked else 0
     while more > 0:
@@ -345,7 +345,7 @@ def bounce_again(w: cython.pointer(Step), s: cython.Py_ssize_t, stage: cython.in
     w.searched[s] = stage
     measure_pairs(w, s)
     number: cython.int = team_take_number(w.team)
-    at: cython.Py_ssize_t = number * w.lists.scratch_room
+    at: cython.Py_ssize_t = number * w.lists.scratch_capacity
     hits: cython.Py_ssize_t = find_hits(w, s, at, True) if w.rough else find_hits(w, s, at, False)
     bounced: cython.bint = bounce_pairs(w, s, at, hits)
     team_give_number(w.team, number)
@@ -367,5 +367,5 @@ def relax_contacts(w: cython.pointer(Step), s: cython.Py_ssize_t) -> cython.void
 def hold_contacts(w: cython.pointer(Step), s: cython.Py_ssize_t) -> cython.void:
     """Keep the pairs of group s from approaching further."""
     number: cython.int = team_take_number(w.team)
-    sweep(w, s, number * w.lists.scratch_room, True, False, False)
+    sweep(w, s, number * w.lists.scratch_capacity, True, False, False)
     team_give_number(w.team, number)

@@ -19,7 +19,7 @@ CROWD = cython.declare(cython.Py_ssize_t, 1024)  # small discs from which cachin
 CACHED = cython.declare(cython.double, 8.0)  # largest cached radius, pixels
 FINE = cython.declare(cython.Py_ssize_t, 16)  # subpixel positions per axis
 SIZES = cython.declare(cython.double, 128.0)  # sizes per factor e: each is within a hundredth of the true one
-ROOM = cython.declare(cython.Py_ssize_t, 1 << 20)  # pixels of all entries; discs that do not fit are drawn directly
+CAPACITY = cython.declare(cython.Py_ssize_t, 1 << 20)  # pixels of all entries; discs that do not fit are drawn directly
 SPARE = cython.declare(cython.Py_ssize_t, 19)  # rows and columns of the largest entry, 2 CACHED + 3
 
 
@@ -57,7 +57,7 @@ def cache_disc(
 
 @kernel
 def draw_cached(
-    pixels: cython.pointer[uint32_t], ground: cython.pointer[cython.const[uint32_t]], colour: uint32_t, centre: int64_t,
+    pixels: cython.pointer[uint32_t], background: cython.pointer[cython.const[uint32_t]], colour: uint32_t, centre: int64_t,
     where: cython.pointer[int32_t], amount: cython.pointer[uint8_t], at: int64_t,
 ) -> cython.void:  # fmt: skip
     """Draw the disc of the entry at `at`, which lies inside the picture; pixels, ground: (h w,); centre: pixel of the centre."""
@@ -68,6 +68,6 @@ def draw_cached(
         p: int64_t = centre + where[k]
         cover: int32_t = amount[k]
         if pixels[p] >> 24 == 0:
-            pixels[p] = (over_full(ground[p], colour, cover) & 0xFFFFFF) | (cython.cast(uint32_t, cover) << 24)
+            pixels[p] = (over_full(background[p], colour, cover) & 0xFFFFFF) | (cython.cast(uint32_t, cover) << 24)
         else:
-            pixels[p] = blend(pixels[p], ground[p], colour, cover)
+            pixels[p] = blend(pixels[p], background[p], colour, cover)

@@ -10,19 +10,19 @@ from cython.cimports.lanes import real
 from cython.cimports.libc.math import INFINITY, ceil, floor, log
 from cython.cimports.libc.stdint import int32_t, int64_t, uint8_t, uint32_t, uint64_t
 
-from pyverlet.core.disc_cache import CACHED, CROWD, FINE, ROOM, SIZES, SPARE, cache_disc, draw_cached
+from pyverlet.common.constants import LEAST_DRAWN_RADIUS
+from pyverlet.core.disc_cache import CACHED, CAPACITY, CROWD, FINE, SIZES, SPARE, cache_disc, draw_cached
 from pyverlet.core.disc_coverage import cover_row
 from pyverlet.core.kernels import inlined, kernel
 from pyverlet.core.pixel_blending import OPAQUE, blend, channel
-from pyverlet.ground.constants import LEAST_DRAWN_RADIUS
 
-DUST = cython.declare(cython.Py_ssize_t, 4)  # narrower discs are drawn together if there is one per so many pixels
+SUBPIXEL = cython.declare(cython.Py_ssize_t, 4)  # narrower discs are drawn together if there is one per so many pixels
 LEAST = cython.declare(cython.double, LEAST_DRAWN_RADIUS)
 PI = cython.declare(cython.double, 3.141592653589793)
 
 Picture = cython.struct(
     pixels=cython.pointer[uint32_t],  # (height, width)
-    ground=cython.pointer[cython.const[uint32_t]],  # the pixels before the first disc
+    background=cython.pointer[cython.const[uint32_t]],  # the pixels before the first disc
     height=int64_t,
     width=int64_t,
     position=cython.pointer[cython.const[real]],  # (count, 2) m
@@ -79,7 +79,7 @@ def survey(p: cython.pointer(Picture)) -> cython.void:
 
 
 @kernel
-def add_dust(p: cython.pointer(Picture), sums: cython.pointer[uint64_t]) -> cython.void:
+def add_subpixel(p: cython.pointer(Picture), sums: cython.pointer[uint64_t]) -> cython.void:
     """Sum coverage and colour per pixel: R and G, B and coverage, of 32 bits each."""
     left: real = p.left
     top: real = p.top
@@ -106,14 +106,16 @@ def add_dust(p: cython.pointer(Picture), sums: cython.pointer[uint64_t]) -> cyth
 
 
 @inlined
-def dust_channel(total: uint64_t, share: cython.double, bare: cython.double, ground: uint32_t, shift: cython.int) -> uint32_t:
+def subpixel_channel(
+    total: uint64_t, share: cython.double, bare: cython.double, background: uint32_t, shift: cython.int
+) -> uint32_t:
     """A channel of the mean colour, blended with the uncovered part of the ground."""
-    value: int32_t = cython.cast(int32_t, share * cython.cast(int64_t, total) + bare * channel(ground, shift) + 0.5)
+    value: int32_t = cython.cast(int32_t, share * cython.cast(int64_t, total) + bare * channel(background, shift) + 0.5)
     return cython.cast(uint32_t, value) << shift
 
 
 @kernel
-def put_dust(p: cython.pointer(Picture), sums: cython.pointer[uint64_t]) -> cython.void:
+def put_subpixel(p: cython.pointer(Picture), sums: cython.pointer[uint64_t]) -> cython.void:
     """Draw the sums: coverage is the sum of areas, colour their mean, independent of the order."""
     for k in range(p.height * p.width):
         rg: uint64_t = sums[2 * k]
@@ -123,9 +125,9 @@ def put_dust(p: cython.pointer(Picture), sums: cython.pointer[uint64_t]) -> cyth
             continue
         share: cython.double = min(1.0 / covered, 1.0 / 255.0)
         bare: cython.double = max(1.0 - covered / 255.0, 0.0)
-        old: uint32_t = p.ground[k]
-        rgb: uint32_t = dust_channel(cython.cast(uint32_t, rg), share, bare, old, 0)
-        rgb |= dust_channel(rg >> 32, share, bare, old, 8) | dust_channel(cython.cast(uint32_t, ba), share, bare, old, 16)
+        old: uint32_t = p.background[k]
+        rgb: uint32_t = subpixel_channel(cython.cast(uint32_t, rg), share, bare, old, 0)
+        rgb |= subpixel_channel(rg >> 32, share, bare, old, 8) | subpixel_channel(cython.cast(uint32_t, ba), share, bare, old, 16)
         p.pixels[k] = rgb | (cython.cast(uint32_t, min(covered, 255.0)) << 24)
 
 
@@ -147,7 +149,7 @@ def put_disc(
                 if amount >= 255:
                     p.pixels[at] = colour
                 elif amount > 0:
-                    p.pixels[at] = blend(p.pixels[at], p.ground[at], colour, amount)
+                    p.pixels[at] = blend(p.pixels[at], p.background[at], colour, amount)
 
 
 @kernel
@@ -158,7 +160,7 @@ def entry_of(
     fine_x: int64_t = cython.cast(int64_t, FINE * (x - cython.cast(int64_t, x)))
     fine_y: int64_t = cython.cast(int64_t, FINE * (y - cython.cast(int64_t, y)))
     k: int64_t = (size * FINE + fine_y) * FINE + fine_x
-    if c.entry[k] == 0 and c.free + SPARE * SPARE + 2 <= ROOM:
+    if c.entry[k] == 0 and c.free + SPARE * SPARE + 2 <= CAPACITY:
         if c.size[size] == 0.0:
             c.size[size] = r
         c.entry[k] = c.free
@@ -170,9 +172,9 @@ def entry_of(
 
 @kernel
 def put_discs(
-    p: cython.pointer(Picture), c: cython.pointer(Cache), dusty: cython.bint, crowd: cython.bint, cover: cython.p_double
+    p: cython.pointer(Picture), c: cython.pointer(Cache), subpixel: cython.bint, crowd: cython.bint, cover: cython.p_double
 ) -> cython.void:
-    """Draw the discs in order; if `dusty`, without narrow ones."""
+    """Draw the discs in order; if `subpixel`, without narrow ones."""
     same: cython.double = 0.0
     size: int64_t = 0
     at: int64_t
@@ -184,10 +186,10 @@ def put_discs(
             continue
         colour: uint32_t = p.colour[i] | OPAQUE
         if r < 0.5:  # such discs lie in the pixel of their centre: a million of them are a cloud
-            if not dusty and x >= 0.0 and x < p.width and y >= 0.0 and y < p.height:
+            if not subpixel and x >= 0.0 and x < p.width and y >= 0.0 and y < p.height:
                 at = cython.cast(int64_t, y) * p.width + cython.cast(int64_t, x)
                 area: int32_t = cython.cast(int32_t, 255.0 * PI * r * r + 0.5)
-                p.pixels[at] = blend(p.pixels[at], p.ground[at], colour, area)
+                p.pixels[at] = blend(p.pixels[at], p.background[at], colour, area)
             continue
         reach: cython.double = r + 2.0
         if crowd and r <= CACHED and x > reach and y > reach and x < p.width - reach and y < p.height - reach:
@@ -197,23 +199,23 @@ def put_discs(
             at = entry_of(p, c, x, y, size, r)
             if at > 0:
                 centre: int64_t = cython.cast(int64_t, y) * p.width + cython.cast(int64_t, x)
-                draw_cached(p.pixels, p.ground, colour, centre, c.where, c.amount, at)
+                draw_cached(p.pixels, p.background, colour, centre, c.where, c.amount, at)
                 continue
         put_disc(p, colour, x, y, r, cover)
 
 
-def draw_discs(pixels, ground, position, radius, colour, left: cython.double, top: cython.double, scale: cython.double):
+def draw_discs(pixels, background, position, radius, colour, left: cython.double, top: cython.double, scale: cython.double):
     """Draw discs on `pixels`, (h, w) uint32, in the order given; many that are narrower than a pixel are drawn first, together.
 
     Many small discs are drawn from a cache that is filled on demand: at the nearest of FINE x FINE subpixel positions, and with
     the radius of the first of nearly their size. Each has its exact area, and is at most a sixteenth of a pixel off.
 
-    `ground`: the pixels before the first disc. `position` (n, 2), `radius` (n,): metres. `colour`: (n,) uint32.
+    `background`: the pixels before the first disc. `position` (n, 2), `radius` (n,): metres. `colour`: (n,) uint32.
     `left`, `top`: metres at the upper left corner of the picture; `scale`: pixels per metre.
     """
     p: Picture
     c: Cache
-    p.pixels, p.ground, p.colour = indices(pixels), const_indices(ground), const_indices(colour)
+    p.pixels, p.background, p.colour = indices(pixels), const_indices(background), const_indices(colour)
     p.position, p.radius = const_reals(position), const_reals(radius)
     p.height, p.width, p.count = pixels.shape[0], pixels.shape[1], len(radius)
     p.left, p.top, p.scale = left, top, scale
@@ -221,24 +223,24 @@ def draw_discs(pixels, ground, position, radius, colour, left: cython.double, to
     cache: cython.pointer(Cache) = cython.address(c)
     with cython.nogil:
         survey(picture)
-    dusty: cython.bint = DUST * p.narrow >= p.height * p.width
-    if dusty:
+    subpixel: cython.bint = SUBPIXEL * p.narrow >= p.height * p.width
+    if subpixel:
         sums = np.zeros(2 * p.height * p.width, np.uint64)
         total: cython.pointer[uint64_t] = words(sums)
         with cython.nogil:
-            add_dust(picture, total)
-            put_dust(picture, total)
+            add_subpixel(picture, total)
+            put_subpixel(picture, total)
         if p.narrow == p.count:
             return
     crowd: cython.bint = p.small >= CROWD
     sizes: cython.Py_ssize_t = cython.cast(int64_t, log(2.0 * CACHED) * SIZES) + 2 if crowd else 0
-    room: cython.Py_ssize_t = ROOM if crowd else 0
+    capacity: cython.Py_ssize_t = CAPACITY if crowd else 0
     entry, size = np.zeros(sizes * FINE * FINE, np.int64), np.zeros(sizes)
-    where, amount, spare = np.empty(room, np.int32), np.empty(room, np.uint8), np.empty(SPARE * SPARE)
+    where, amount, spare = np.empty(capacity, np.int32), np.empty(capacity, np.uint8), np.empty(SPARE * SPARE)
     c.entry, c.size, c.cover = integers(entry), doubles(size), doubles(spare)
     c.where, c.amount = small_integers(where), octets(amount)
     c.free = 1
     cover = np.zeros(p.columns + 1)
     row: cython.p_double = doubles(cover)
     with cython.nogil:
-        put_discs(picture, cache, dusty, crowd, row)
+        put_discs(picture, cache, subpixel, crowd, row)

@@ -1,7 +1,7 @@
 # mypy: ignore-errors
 """Removes energy from clusters that have gained too much in a frame, in the order that `laws.limiter` describes.
 
-Sums over a cluster run on one thread in the order of the slots.
+Sums over a cluster run on one thread in the order of the rows.
 """
 
 from __future__ import annotations
@@ -108,7 +108,7 @@ def kinetic_energy(b: cython.pointer(Bodies), i: cython.Py_ssize_t, m: cython.do
 def raise_of(then, now, order, before, pull, limits, lift, moved):
     """lift: (n,) J, work of each particle against gravity and forces in this frame, by the trapezoidal rule; moved: (n, 2) m.
 
-    then: bodies in the user's order, now: by slot; order: (n,) the user's index. before, pull: (n, 2) N, forces with a potential
+    then: bodies in the user's order, now: by row; order: (n,) the user's index. before, pull: (n, 2) N, forces with a potential
     besides gravity at the start of the frame and now, or empty.
     """
     a: Bodies
@@ -117,7 +117,7 @@ def raise_of(then, now, order, before, pull, limits, lift, moved):
     map_bodies(cython.address(a), then)
     map_bodies(cython.address(b), now)
     read_limits(cython.address(g), limits)
-    who: cython.pointer[cython.const[int32_t]] = const_small_integers(order)
+    which: cython.pointer[cython.const[int32_t]] = const_small_integers(order)
     was: cython.pointer[cython.const[cython.double]] = const_doubles(before)
     pulled: cython.pointer[cython.const[cython.double]] = const_doubles(pull)
     pulls: cython.bint = len(pull) > 0
@@ -125,7 +125,7 @@ def raise_of(then, now, order, before, pull, limits, lift, moved):
     way: cython.pointer(cython.double) = doubles(moved)
     count: cython.Py_ssize_t = len(lift)
     for k in range(count):
-        i: cython.Py_ssize_t = who[k]
+        i: cython.Py_ssize_t = which[k]
         m: cython.double = free_mass(cython.address(b), k)
         x: cython.double = b.position[2 * k]
         y: cython.double = b.position[2 * k + 1]
@@ -210,7 +210,7 @@ def share_out(g: cython.pointer(Limits), of: cython.pointer(cython.double), clus
 
 
 @kernel
-def take_within(
+def remove_within(
     now: cython.pointer(Bodies),
     cluster: cython.pointer[cython.const[int64_t]],
     count: cython.Py_ssize_t,

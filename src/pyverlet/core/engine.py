@@ -3,8 +3,8 @@
 
 from __future__ import annotations
 
-from pyverlet.core.engine_noting import given_by
 from pyverlet.core.engine_object import Engine
+from pyverlet.core.engine_records import given_by
 from pyverlet.core.measure import energies, momenta, pinned_move
 from pyverlet.core.periodic import wrap
 from pyverlet.core.plain_object import PlainFrames

@@ -24,20 +24,20 @@ from cython.cimports.lanes import real
 from cython.cimports.libc.stdint import int32_t, int64_t, uint32_t
 from cython.cimports.team import team_reserved
 
+from pyverlet.common import memory
 from pyverlet.core.cell_sorting import pieces_of
 from pyverlet.core.cells import BLOCK, LEVELS, Cells
-from pyverlet.core.engine_hearing import make_hearing_arrays
+from pyverlet.core.contact_recording import ROW
+from pyverlet.core.contact_records import RECORD_COLUMNS
+from pyverlet.core.engine_events import make_event_arrays
 from pyverlet.core.engine_rebounds import make_rebound_arrays
 from pyverlet.core.engine_surfaces import make_surface_rows, set_rows
-from pyverlet.core.noted import TOUCHES
-from pyverlet.core.noting import NOTED
 from pyverlet.core.pair_batches import SPARE_LANES
 from pyverlet.core.pair_groups import GROUP, mark_dirty
 from pyverlet.core.pair_lists import INDEX_WORDS, Lists
-from pyverlet.core.pair_memory import hang
+from pyverlet.core.pair_memory import chain_pair
 from pyverlet.core.step import Step
 from pyverlet.core.surface_lists import swap_surfaces
-from pyverlet.ground import memory
 
 
 @cython.cfunc
@@ -103,7 +103,7 @@ def make_particle_arrays(w: cython.pointer(Step), a, count: cython.Py_ssize_t, d
     ls.speeds = reals_in(a, "speeds")
     ls.momenta, w.energy = doubles_in(a, "momenta"), doubles_in(a, "energy")
     ls.fan = 0
-    make_chains(w, a, ls.lanes_room)
+    make_chains(w, a, ls.lanes_capacity)
     make_rare_arrays(w, a, dtype)
     ls.row, ls.found, ls.held_lanes = integers_in(a, "row"), integers_in(a, "found"), integers_in(a, "held_lanes")
     ls.looked, ls.beyond, ls.dirty = integers_in(a, "looked"), integers_in(a, "beyond"), octets_in(a, "dirty")
@@ -113,13 +113,13 @@ def make_particle_arrays(w: cython.pointer(Step), a, count: cython.Py_ssize_t, d
 
 
 @cython.cfunc
-def make_scratch_arrays(w: cython.pointer(Step), a, room: cython.Py_ssize_t, threads, dtype):
+def make_scratch_arrays(w: cython.pointer(Step), a, capacity: cython.Py_ssize_t, threads, dtype):
     """Allocate scratch arrays per thread for so many pairs, or lanes, of the group in work: list building and impacts."""
     ls: cython.pointer(Lists) = w.lists
-    ls.scratch_room = room
+    ls.scratch_capacity = capacity
     kinds = {"raw_i": np.uint32, "raw_j": np.uint32, "sorted": np.uint32, "rest": np.uint32, "key": np.uint8}
     kinds |= {"put_i": np.uint32, "put_j": np.uint32, "put_x": dtype, "put_y": dtype, "hit": np.int64, "hit_time": np.float64}
-    a |= {name: memory.zeros(threads * room, kind) for name, kind in kinds.items()}
+    a |= {name: memory.zeros(threads * capacity, kind) for name, kind in kinds.items()}
     ls.raw_i, ls.raw_j = indices_in(a, "raw_i"), indices_in(a, "raw_j")
     ls.sorted, ls.rest = indices_in(a, "sorted"), indices_in(a, "rest")
     ls.key, ls.put_i, ls.put_j = octets_in(a, "key"), indices_in(a, "put_i"), indices_in(a, "put_j")
@@ -140,7 +140,7 @@ def lengthen(a, name, shape, dtype):
 def make_lane_arrays(w: cython.pointer(Step), a, lanes: cython.Py_ssize_t, dtype):
     """Allocate arrays for so many lanes while the list is made anew; contact state, and the chains that link it, are kept."""
     ls: cython.pointer(Lists) = w.lists
-    ls.lanes_room = lanes
+    ls.lanes_capacity = lanes
     lost = {"i": (lanes, np.uint32), "j": (lanes, np.uint32), "gap": ((2, lanes), dtype), "depth": (lanes, dtype)}
     a |= dict.fromkeys(lost)  # first: what is kept exists twice for a moment
     for name, shape in (("normal", (2, lanes)), ("load", (lanes,)), ("impulse", (lanes,))):
@@ -157,25 +157,29 @@ def make_lane_arrays(w: cython.pointer(Step), a, lanes: cython.Py_ssize_t, dtype
 
 
 @cython.cfunc
-def make_noting_room(a, rows: cython.Py_ssize_t):
-    """Allocate memory in advance in which so many rows of `core.noting` become records, so that the first query is fast."""
-    if "noted_key" not in a or len(a["noted_key"]) < rows:
-        a |= {name: memory.zeros(rows, np.int64) for name in ("noted_key", "noted_order")}
-        a["noted_row"], records = memory.zeros((rows, NOTED), np.float64), memory.zeros((rows, TOUCHES), np.int64)
-        a["noted_records"] = records, records.view(np.float64)
+def reserve_records(a, rows: cython.Py_ssize_t):
+    """Allocate memory in advance in which so many rows of `core.contact_recording` become records: the first query is fast."""
+    if "recorded_key" not in a or len(a["recorded_key"]) < rows:
+        a |= {name: memory.zeros(rows, np.int64) for name in ("recorded_key", "recorded_order")}
+        a["recorded_row"], records = memory.zeros((rows, ROW), np.float64), memory.zeros((rows, RECORD_COLUMNS), np.int64)
+        a["recorded_records"] = records, records.view(np.float64)
 
 
 @cython.cfunc
 def make_rare_arrays(w: cython.pointer(Step), a, dtype):
     """Allocate arrays that few worlds need: for contact records, friction and rolling resistance."""
-    lanes = w.lists.lanes_room
-    wanted = {"noted": ((3, lanes), w.noting), "tangent_impulse": ((lanes,), w.tangents), "roll_impulse": ((lanes,), w.rollings)}
+    lanes = w.lists.lanes_capacity
+    wanted = {
+        "summed": ((3, lanes), w.records_contacts),
+        "tangent_impulse": ((lanes,), w.tangents),
+        "roll_impulse": ((lanes,), w.rollings),
+    }
     for name, (shape, asked) in wanted.items():
         if asked and (name not in a or a[name].shape != shape):
             lengthen(a, name, shape, dtype)
-    if w.noting:
-        make_noting_room(a, lanes)
-        w.noted_x, w.noted_y, w.noted_virial = map_row(a["noted"], 0), map_row(a["noted"], 1), map_row(a["noted"], 2)
+    if w.records_contacts:
+        reserve_records(a, lanes)
+        w.summed_x, w.summed_y, w.summed_virial = map_row(a["summed"], 0), map_row(a["summed"], 1), map_row(a["summed"], 2)
     if w.tangents:
         w.tangent_impulse = reals_in(a, "tangent_impulse")
         set_rows(a, ("motion",), w.count, (4,), dtype)
@@ -197,13 +201,13 @@ def make_chains(w: cython.pointer(Step), a, lanes: cython.Py_ssize_t):
     old, before = a.get("head"), ls.fan
     ls.fan, a["head"] = fan, np.full(w.count * fan, -1, np.int32)
     ls.head = small_integers_in(a, "head")
-    if ls.harvested:
-        hang_again(ls, old, before, np.arange(w.count, dtype=np.int32))
+    if ls.impulses_stored:
+        chain_pairs_again(ls, old, before, np.arange(w.count, dtype=np.int32))
 
 
 @cython.cfunc
-def hang_again(ls: cython.pointer(Lists), old, fan: cython.Py_ssize_t, place):
-    """Rehang entries of the `old` chains, `fan` per slot, on the current ones; slot k is now place[k], or removed (-1)."""
+def chain_pairs_again(ls: cython.pointer(Lists), old, fan: cython.Py_ssize_t, place):
+    """Rehang entries of the `old` chains, `fan` per row, on the current ones; row k is now place[k], or removed (-1)."""
     before: cython.pointer(int32_t) = small_integers(old)
     now: cython.pointer(int32_t) = small_integers(place)
     c: cython.Py_ssize_t
@@ -214,45 +218,45 @@ def hang_again(ls: cython.pointer(Lists), old, fan: cython.Py_ssize_t, place):
             p: int32_t = now[c // fan]
             q: int32_t = now[ls.kept_other[INDEX_WORDS * n]]
             if p >= 0 and q >= 0:
-                hang(ls, cython.cast(uint32_t, min(p, q)), cython.cast(uint32_t, max(p, q)), n)
+                chain_pair(ls, cython.cast(uint32_t, min(p, q)), cython.cast(uint32_t, max(p, q)), n)
             n = following
 
 
 @cython.cfunc
 def forget_pairs(w: cython.pointer(Step)):
     """Discard the pair list and all contact state."""
-    w.lists.listed = w.lists.good = w.lists.harvested = False
+    w.lists.listed = w.lists.good = w.lists.impulses_stored = False
     w.groups = w.lists.rows = 0
     w.evens = w.odds = w.alone = 0
 
 
 @cython.cfunc
-def note_places(w: cython.pointer(Step), place, gone, closes: cython.bint):
-    """Mark slots that move to `place`, and removed ones, in the list. It stays valid only if remaining slots keep their order.
+def renumber_places(w: cython.pointer(Step), place, gone, closes: cython.bint):
+    """Mark rows that move to `place`, and removed ones, in the list. It stays valid only if remaining rows keep their order.
 
     closes: they do, and are packed without gaps.
     """
     ls: cython.pointer(Lists) = w.lists
     now: cython.pointer(int32_t) = small_integers(place)
-    slot: cython.pointer(int64_t) = integers(gone)
+    sorted_index: cython.pointer(int64_t) = integers(gone)
     last: int32_t = -1
     k: cython.Py_ssize_t
     n: cython.Py_ssize_t
     for n in range(len(gone) if ls.listed else 0):
-        mark_dirty(w.cells, ls, slot[n], w.listed[2 * slot[n]], w.listed[2 * slot[n] + 1])
+        mark_dirty(w.cells, ls, sorted_index[n], w.listed[2 * sorted_index[n]], w.listed[2 * sorted_index[n] + 1])
     for k in range(0 if closes else len(place)):
         if now[k] >= 0:
             ls.good = ls.good and now[k] > last
             last = now[k]
-    ls.mending, ls.place = True, now
+    ls.patching, ls.place = True, now
     ls.anew = ls.anew or (ls.tied and closes and len(gone) > 0)  # particle numbers have changed
 
 
 @cython.cfunc
 def move_rows(w: cython.pointer(Step), a, place, gone, source, count: cython.Py_ssize_t, dtype):
-    """Move slot k to place[k] of `count`, or drop it (-1), with its contact state in chains or in the list.
+    """Move row k to place[k] of `count`, or drop it (-1), with its contact state in chains or in the list.
 
-    gone: removed slots, ascending. source: (count,) the previous slot of each, or -1; None: remaining slots are packed without
+    gone: removed rows, ascending. source: (count,) the previous row of each, or -1; None: remaining rows are packed without
     gaps, and new ones follow.
     """
     old, fan, listed = a["head"], w.lists.fan, w.lists.listed
@@ -264,14 +268,14 @@ def move_rows(w: cython.pointer(Step), a, place, gone, source, count: cython.Py_
     make_particle_arrays(w, a, count, dtype)
     if not listed:
         forget_pairs(w)
-        hang_again(w.lists, old, fan, place)
-        w.lists.harvested = True
+        chain_pairs_again(w.lists, old, fan, place)
+        w.lists.impulses_stored = True
 
 
 @cython.cfunc
 def make_material_arrays(w: cython.pointer(Step), a, dtype):
     """Allocate arrays for the materials of pairs: one entry per lane, or eight if all are alike."""
-    lanes = max(w.lists.lanes_room, 8)
+    lanes = max(w.lists.lanes_capacity, 8)
     shapes = {
         "reach": (2, lanes if w.sized else 8),
         "share": (lanes if w.varied else 8,),
@@ -291,18 +295,18 @@ def make_material_arrays(w: cython.pointer(Step), a, dtype):
 @cython.cfunc
 def make_lanes(w: cython.pointer(Step), a, lanes, dtype):
     """Allocate arrays for at least so many lanes; contact state is kept."""
-    if lanes > w.lists.lanes_room:
+    if lanes > w.lists.lanes_capacity:
         make_lane_arrays(w, a, lanes, dtype)
         make_chains(w, a, lanes)
         make_material_arrays(w, a, dtype)
-        make_hearing_arrays(w, a, dtype)
+        make_event_arrays(w, a, dtype)
 
 
 @cython.cfunc
-def make_pair_room(w: cython.pointer(Step), a, threads: cython.int, dtype):
+def reserve_pairs(w: cython.pointer(Step), a, threads: cython.int, dtype):
     """Allocate room for as many pairs as the last list would have needed."""
     most = w.lists.most
-    if most > w.lists.scratch_room:
+    if most > w.lists.scratch_capacity:
         make_scratch_arrays(w, a, 5 * most // 4, threads, dtype)
     # Groups without scratch memory have reserved nothing: count their pairs, plus some for partial batches.
     found = a["found"][: w.groups].sum() + 2 * SPARE_LANES * w.groups
@@ -340,7 +344,7 @@ def set_materials(w: cython.pointer(Step), a, n, dtype):
     w.surfaces_good = False
     w.cells.bulk, w.cells.smallest, ls.largest, ls.mean_radius = n["bulk"], n["smallest"], n["largest"], n["mean_radius"]
     ls.restitution, ls.friction, ls.rolling = n["restitution"], n["friction"], n["rolling"]
-    ls.picky = n["picky"] or ls.linked
+    ls.tests_pairs = n["tests_pairs"] or ls.linked
     ls.refill, ls.brute = True, n["brute"]
     a["together"] = n["together"]
     w.combine, w.materials, w.together = n["combine"], len(n["together"]), doubles(n["together"])

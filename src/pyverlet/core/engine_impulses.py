@@ -11,7 +11,7 @@ from cython.cimports.libc.stdint import int32_t, int64_t, uint32_t
 
 from pyverlet.core.kernels import inlined
 from pyverlet.core.pair_lists import INDEX_WORDS, Lists
-from pyverlet.core.pair_memory import GONE, clear_chains, hang, repeats
+from pyverlet.core.pair_memory import GONE, chain_pair, clear_chains, repeats
 from pyverlet.core.step import TOUCHED, Step
 
 
@@ -23,10 +23,10 @@ def remembers(w: cython.pointer(Step), s: cython.Py_ssize_t, k: int64_t) -> cyth
 
 
 @cython.cfunc
-def read_impulses(w: cython.pointer(Step), who: cython.pointer(int32_t), particle, dtype):
-    """(pairs, values) as of `Engine.take_impulses`, from the list; who: the user's index of each slot."""
-    if w.lists.harvested:
-        return read_chains(w, who, dtype)
+def read_impulses(w: cython.pointer(Step), which: cython.pointer(int32_t), particle, dtype):
+    """(pairs, values) as of `Engine.take_impulses`, from the list; who: the user's index of each row."""
+    if w.lists.impulses_stored:
+        return read_chains(w, which, dtype)
     first = np.zeros(int(particle.max(initial=-1)) + 2, np.int64)
     begin: cython.pointer(int64_t) = integers(first)
     s: cython.Py_ssize_t
@@ -35,7 +35,7 @@ def read_impulses(w: cython.pointer(Step), who: cython.pointer(int32_t), particl
     for s in range(groups):
         for k in range(w.begin[s], w.begin[s] + w.lanes[s]):
             if remembers(w, s, k):
-                begin[min(who[w.i[k]], who[w.j[k]]) + 1] += 1
+                begin[min(which[w.i[k]], which[w.j[k]]) + 1] += 1
     np.cumsum(first, out=first)
     pairs, values = np.empty((first[-1], 2), np.int32), np.empty((first[-1], 4), dtype)
     pair: cython.pointer(int32_t) = small_integers(pairs)
@@ -43,8 +43,8 @@ def read_impulses(w: cython.pointer(Step), who: cython.pointer(int32_t), particl
     for s in range(groups):
         for k in range(w.begin[s], w.begin[s] + w.lanes[s]):
             if remembers(w, s, k):
-                p: int32_t = who[w.i[k]]
-                q: int32_t = who[w.j[k]]
+                p: int32_t = which[w.i[k]]
+                q: int32_t = which[w.j[k]]
                 n: int64_t = begin[min(p, q)]
                 begin[min(p, q)] = n + 1
                 pair[2 * n], pair[2 * n + 1] = min(p, q), max(p, q)
@@ -60,7 +60,7 @@ def read_impulses(w: cython.pointer(Step), who: cython.pointer(int32_t), particl
 
 
 @cython.cfunc
-def read_chains(w: cython.pointer(Step), who: cython.pointer(int32_t), dtype):
+def read_chains(w: cython.pointer(Step), which: cython.pointer(int32_t), dtype):
     """(pairs, values) as of `Engine.take_impulses`, from the chains."""
     ls: cython.pointer(Lists) = w.lists
     hung: cython.Py_ssize_t = 0
@@ -77,8 +77,8 @@ def read_chains(w: cython.pointer(Step), who: cython.pointer(int32_t), dtype):
     for c in range(w.count * ls.fan):
         n = ls.head[c]
         while n >= 0:
-            p: int32_t = who[c // ls.fan]
-            q: int32_t = who[ls.kept_other[INDEX_WORDS * n]]
+            p: int32_t = which[c // ls.fan]
+            q: int32_t = which[ls.kept_other[INDEX_WORDS * n]]
             pair[2 * hung], pair[2 * hung + 1] = min(p, q), max(p, q)
             value[4 * hung], value[4 * hung + 2] = w.impulse[n], w.load[n]
             value[4 * hung + 1] = w.tangent_impulse[n] if w.tangents else 0
@@ -90,7 +90,7 @@ def read_chains(w: cython.pointer(Step), who: cython.pointer(int32_t), dtype):
 
 @cython.cfunc
 def fill_kept(w: cython.pointer(Step), pairs, values):
-    """Add entries to the chains of their lower slots."""
+    """Add entries to the chains of their lower rows."""
     ls: cython.pointer(Lists) = w.lists
     pair: cython.pointer(int32_t) = small_integers(pairs)
     value: cython.pointer(real) = reals(values)
@@ -103,4 +103,4 @@ def fill_kept(w: cython.pointer(Step), pairs, values):
             w.tangent_impulse[k] = value[4 * k + 1]
         if w.rollings:
             w.roll_impulse[k] = value[4 * k + 3]
-        hang(ls, cython.cast(uint32_t, low), cython.cast(uint32_t, max(pair[2 * k], pair[2 * k + 1])), k)
+        chain_pair(ls, cython.cast(uint32_t, low), cython.cast(uint32_t, max(pair[2 * k], pair[2 * k + 1])), k)

@@ -18,16 +18,16 @@ def fill_links(
 ):
     """Set pointers to the arrays of `CoreLinks`, and allocate those that only the core uses."""
     k: cython.pointer(Links) = w.link_table
-    k.count, k.rows, k.pins, k.colours = len(a["slot"]), len(a["kind"]), len(a["pin_node"]), len(a["colour"]) - 1
+    k.count, k.rows, k.pins, k.colours = len(a["sorted_index"]), len(a["kind"]), len(a["pin_node"]), len(a["colour"]) - 1
     k.passes, k.substeps, k.period_x, k.period_y = passes, substeps, period_x, period_y
     if "x" not in a:
         engine_numpy.have_link_arrays(a, MOTOR)
     k.loose, k.motors = bool(a["alone"].all()), bool(a["powered"].any())
     k.gives = k.motors or not (np.isinf(a["stiffness"]).all() and np.isinf(a["pin_stiffness"]).all())
-    k.slot, k.x, k.u, k.own = indices_in(a, "slot"), doubles_in(a, "x"), doubles_in(a, "u"), doubles_in(a, "own")
-    k.weight, k.loaned, k.driven = doubles_in(a, "weight"), doubles_in(a, "loaned"), doubles_in(a, "driven")
+    k.sorted_index, k.x, k.u, k.own = indices_in(a, "sorted_index"), doubles_in(a, "x"), doubles_in(a, "u"), doubles_in(a, "own")
+    k.weight, k.warmed, k.driven = doubles_in(a, "weight"), doubles_in(a, "warmed"), doubles_in(a, "driven")
     k.react, k.stiff, k.struck = doubles_in(a, "react"), small_integers_in(a, "stiff"), doubles_in(a, "struck")
-    k.rubs, k.rim, k.spun = small_integers_in(a, "rubs"), doubles_in(a, "rim"), doubles_in(a, "spun")
+    k.has_friction, k.rim, k.spun = small_integers_in(a, "has_friction"), doubles_in(a, "rim"), doubles_in(a, "spun")
     k.powered, k.ease, k.begun = small_integers_in(a, "powered"), doubles_in(a, "ease"), doubles_in(a, "begun")
     k.had, k.held = doubles_in(a, "had"), small_integers_in(a, "held")
     k.pin_node, k.pin_point = integers_in(a, "pin_node"), doubles_in(a, "pin_point")
@@ -40,7 +40,7 @@ def fill_links(
     k.slope, k.kind, k.rest = doubles_in(a, "slope"), small_integers_in(a, "kind"), doubles_in(a, "rest")
     k.stiffness, k.damping, k.upper = doubles_in(a, "stiffness"), doubles_in(a, "damping"), doubles_in(a, "upper")
     k.slack, k.strength, k.intact = doubles_in(a, "slack"), doubles_in(a, "strength"), small_integers_in(a, "intact")
-    k.impulse, k.load, k.blow = doubles_in(a, "impulse"), doubles_in(a, "load"), doubles_in(a, "blow")
+    k.impulse, k.load, k.impact = doubles_in(a, "impulse"), doubles_in(a, "load"), doubles_in(a, "impact")
     k.saved, k.ahead, k.pull = doubles_in(a, "saved"), doubles_in(a, "ahead"), doubles_in(a, "pull")
     k.value, k.next, k.soft = doubles_in(a, "value"), doubles_in(a, "next"), doubles_in(a, "soft")
     k.target, k.keeps, k.acts = doubles_in(a, "target"), doubles_in(a, "keeps"), small_integers_in(a, "acts")

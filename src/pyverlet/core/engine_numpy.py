@@ -10,7 +10,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import DTypeLike
 
-from pyverlet.ground.arrays import Array
+from pyverlet.common.arrays import Array
 
 Arrays = dict[str, Array]
 
@@ -30,15 +30,15 @@ def have_zeros(a: Arrays, shapes: dict[str, tuple[tuple[int, ...], DTypeLike]]) 
 
 def have_link_arrays(a: Arrays, motor: int) -> None:
     """Allocate the arrays that only the core uses, besides those of `world/core_links.py`. motor: kind of motor rows."""
-    particles, rows, pins = len(a["slot"]), len(a["kind"]), len(a["pin_node"])
-    a |= {name: np.zeros((particles, 2)) for name in ("x", "u", "loaned", "driven", "react")}
+    particles, rows, pins = len(a["sorted_index"]), len(a["kind"]), len(a["pin_node"])
+    a |= {name: np.zeros((particles, 2)) for name in ("x", "u", "warmed", "driven", "react")}
     a |= {name: np.zeros(particles) for name in ("own", "weight", "rim", "ease", "spun", "struck")}
     a["begun"] = np.zeros((particles, 3))
     a |= {name: np.zeros((len(a["node"]), 2)) for name in ("gradient", "slope")}
-    a |= {name: np.zeros(rows) for name in ("soft", "target", "turned", "turning", "keeps", "chord_speed", "blow", "saved")}
+    a |= {name: np.zeros(rows) for name in ("soft", "target", "turned", "turning", "keeps", "chord_speed", "impact", "saved")}
     a |= {name: np.zeros((rows, 2)) for name in ("way", "end_way", "given", "along", "wanted", "answer", "had")}
     a |= {"inverse": np.zeros((rows, 3)), "ahead": np.zeros((rows, 3)), "acts": np.zeros(rows, np.int32)}
-    a["rubs"] = np.ones(particles, np.int32)
+    a["has_friction"] = np.ones(particles, np.int32)
     a["held"] = np.full(particles, -1, np.int32)
     driven = a["node"][a["first"][:-1][a["kind"] == motor]]
     a["powered"] = np.bincount(driven, minlength=particles).astype(np.int32)
@@ -48,7 +48,7 @@ def have_link_arrays(a: Arrays, motor: int) -> None:
 
 def stiff_ones(a: Arrays, motor: int) -> Array:
     """(particles,) whether a rigid row or pin holds each linked particle, in sets small enough to take impacts as a whole."""
-    count, entries = len(a["slot"]), np.diff(a["first"])
+    count, entries = len(a["sorted_index"]), np.diff(a["first"])
     rigid = np.repeat(np.isinf(a["stiffness"]) & (a["kind"] != motor), entries)
     node, row = a["node"][rigid], np.repeat(np.arange(len(entries)), entries)[rigid]
     lowest, held = np.arange(count), np.bincount(node, minlength=count)
@@ -62,13 +62,13 @@ def stiff_ones(a: Arrays, motor: int) -> Array:
     return ((held > 0) & (np.bincount(lowest, minlength=count)[lowest] <= MOST_TOGETHER)).astype(np.int32)
 
 
-def have_rebound_arrays(a: Arrays, count: int, blocks: int, lanes: int, places: int, blow: int, rebound: int) -> None:
-    """Allocate arrays for particles, blocks, groups, lanes, and places of surfaces; blow, rebound: numbers of columns."""
+def have_rebound_arrays(a: Arrays, count: int, blocks: int, lanes: int, places: int, impact: int, rebound: int) -> None:
+    """Allocate arrays for particles, blocks, groups, lanes, and places of surfaces; impact, rebound: numbers of columns."""
     groups = len(a["bounced"])
     have_zeros(
         a,
         {
-            "blow": ((count, blow), np.float64),
+            "impact": ((count, impact), np.float64),
             "node": ((count,), np.int32),
             "rebounds": ((blocks,), np.int32),
             "rebounded": ((groups,), np.int32),
@@ -91,7 +91,7 @@ def runs(begin: Array, count: Array) -> tuple[Array, Array]:
 
 
 def places_of(a: Arrays) -> tuple[Array, Array]:
-    """(slot, place) of the contacts in the list of surfaces."""
+    """(sorted_index, place) of the contacts in the list of surfaces."""
     return runs(a["contact_begin"], a["contact_end"] - a["contact_begin"])
 
 
@@ -103,7 +103,7 @@ def listed_pairs(a: Arrays, groups: int) -> tuple[Array, ...]:
 
 
 def renumber_list(a: Arrays, order: Array, groups: int) -> None:
-    """Renumber slots in the list: the particle of slot order[k] moves to slot k."""
+    """Renumber rows in the list: the particle of row order[k] moves to row k."""
     place = np.empty(len(order), np.uint32)
     place[order] = np.arange(len(order), dtype=np.uint32)
     for s in range(groups):
@@ -116,8 +116,8 @@ def renumber_list(a: Arrays, order: Array, groups: int) -> None:
 
 
 def remembered_at_surfaces(a: Arrays, side: int, push: int, roll: int, held: int) -> tuple[Array, Array, Array]:
-    """(slot, surface, values) of loaded contacts, and of those with one-way lines; the load is -1 where these let one pass."""
-    slot, place = places_of(a)
+    """(sorted_index, surface, values) of loaded contacts, and those with one-way lines; the load is -1 where these let pass."""
+    sorted_index, place = places_of(a)
     values, holds, surface = (
         a[f"contact{side}"][place, push : roll + 1],
         a[f"contact{side}"][place, held],
@@ -125,20 +125,20 @@ def remembered_at_surfaces(a: Arrays, side: int, push: int, roll: int, held: int
     )
     values[holds < 0, 0] = -1
     loaded = ((values[:, 0] > 0) | (holds != 0)) & (surface >= 0)  # contacts with pinned circles are stored as pairs
-    return slot[loaded].astype(np.int32), surface[loaded], values[loaded]
+    return sorted_index[loaded].astype(np.int32), surface[loaded], values[loaded]
 
 
 def remember_at_surfaces(a: Arrays, side: int, rows: tuple[Array, Array, Array], push: int, roll: int, held: int) -> None:
-    """Write (slot, surface, values), sorted by slot, to one of the two surface lists."""
-    slot, surface, values = rows
-    contact = a[f"contact{side}"][: len(slot)]
-    a[f"surface{side}"][: len(slot)] = surface
+    """Write (sorted_index, surface, values), sorted by row, to one of the two surface lists."""
+    sorted_index, surface, values = rows
+    contact = a[f"contact{side}"][: len(sorted_index)]
+    a[f"surface{side}"][: len(sorted_index)] = surface
     contact[:, push : roll + 1] = values
     contact[:, held] = np.where(values[:, 0] < 0, -1, 1)
     contact[:, push] = np.maximum(values[:, 0], 0)
     particles = np.arange(len(a["contact_begin"]))
-    a["contact_begin"][:] = np.searchsorted(slot, particles, "left")
-    a["contact_end"][:] = np.searchsorted(slot, particles, "right")
+    a["contact_begin"][:] = np.searchsorted(sorted_index, particles, "left")
+    a["contact_end"][:] = np.searchsorted(sorted_index, particles, "right")
 
 
 def bits_set(words: Array) -> tuple[Array, Array]:

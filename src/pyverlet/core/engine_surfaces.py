@@ -21,16 +21,16 @@ MOST_LOOKED_FOR = cython.declare(cython.int, 8)
 
 
 @cython.cfunc
-def make_surface_arrays(w: cython.pointer(Step), a, room: cython.Py_ssize_t):
+def make_surface_arrays(w: cython.pointer(Step), a, capacity: cython.Py_ssize_t):
     """Allocate two surface lists with so many places each; the state of the previous one is kept."""
     old = w.side != 0
     for side in range(2):
-        surface, contact = np.zeros(room + 8, np.int32), np.zeros((room + 8, CONTACT))
-        if (side == 0) == old and w.contact_room > 0:
+        surface, contact = np.zeros(capacity + 8, np.int32), np.zeros((capacity + 8, CONTACT))
+        if (side == 0) == old and w.contact_capacity > 0:
             before = len(a[f"surface{side}"])
             surface[:before], contact[:before] = a[f"surface{side}"], a[f"contact{side}"]
         a[f"surface{side}"], a[f"contact{side}"] = surface, contact
-    a["clear"], w.contact_room = np.zeros((room + 8, 3)), room
+    a["clear"], w.contact_capacity = np.zeros((capacity + 8, 3)), capacity
     w.clear = doubles_in(a, "clear")
     make_rebound_arrays(w, a)
     point_to_surfaces(w, a)
@@ -66,7 +66,7 @@ def make_surface_rows(w: cython.pointer(Step), a):
     w.at_surface, w.at_surface_count = small_integers_in(a, "at_surface"), small_integers_in(a, "at_surface_count")
     w.contact_count = integers_in(a, "contact_count")
     w.surfaces_good, w.surfaces_kept = False, True
-    if w.contact_room == 0:
+    if w.contact_capacity == 0:
         make_surface_arrays(w, a, 64)
     point_to_surfaces(w, a)
 
@@ -77,7 +77,7 @@ def point_to_surfaces(w: cython.pointer(Step), a):
     now, before = ("1", "0") if w.side else ("0", "1")
     w.surface, w.contact = small_integers(a["surface" + now]), doubles(a["contact" + now])
     w.old_surface, w.old_contact = small_integers(a["surface" + before]), doubles(a["contact" + before])
-    if w.noting:
+    if w.records_contacts:
         if "by_surface" not in a or len(a["by_surface"]) < len(a["surface" + now]):
             a["by_surface"] = np.zeros((len(a["surface" + now]), GIVEN))
         w.by_surface = doubles_in(a, "by_surface")
@@ -85,7 +85,7 @@ def point_to_surfaces(w: cython.pointer(Step), a):
 
 @cython.cfunc
 def take_surfaces(w: cython.pointer(Step), a):
-    """(slot, surface, values) of loaded contacts, and of those with one-way lines; the load is -1 where a line lets one pass."""
+    """(sorted_index, surface, values) of loaded contacts, and those with one-way lines; the load is -1 where a line lets pass."""
     if w.count <= 0:
         return np.zeros(0, np.int32), np.zeros(0, np.int32), np.zeros((0, 3))
     side = 1 - w.side if w.surfaces_kept else w.side  # the previous list, until it has been matched
@@ -93,12 +93,12 @@ def take_surfaces(w: cython.pointer(Step), a):
 
 
 @cython.cfunc
-def give_surfaces(w: cython.pointer(Step), a, slot, surface, values):
-    """Set contacts, sorted by slot, for the next list to match."""
-    if len(slot) > w.contact_room:
-        w.contact_room = 0
-        make_surface_arrays(w, a, len(slot))
-    engine_numpy.remember_at_surfaces(a, 1 - w.side, (slot, surface, values), PUSH, ROLL, HELD)
+def give_surfaces(w: cython.pointer(Step), a, sorted_index, surface, values):
+    """Set contacts, sorted by row, for the next list to match."""
+    if len(sorted_index) > w.contact_capacity:
+        w.contact_capacity = 0
+        make_surface_arrays(w, a, len(sorted_index))
+    engine_numpy.remember_at_surfaces(a, 1 - w.side, (sorted_index, surface, values), PUSH, ROLL, HELD)
     w.surfaces_good, w.surfaces_kept = False, True
 
 
@@ -112,7 +112,7 @@ def set_obstacles(w: cython.pointer(Step), a, cell: cython.double, keep: cython.
     if not keep:
         w.surfaces_good = False
         a["heads"].fill(-1)
-        w.links, w.links_room = 0, len(a["links"])
+        w.links, w.links_capacity = 0, len(a["links"])
 
 
 @cython.cfunc

@@ -45,7 +45,7 @@ def energy_of_last(w: cython.pointer(Step), share: cython.double) -> cython.doub
 @cython.cfunc
 def friction_of_last(w: cython.pointer(Step), share: cython.double) -> tuple:
     """The parts of that along tangents, by rolling resistance, and by motors, J."""
-    rubbed: cython.double = 0
+    by_friction: cython.double = 0
     rolled: cython.double = 0
     half: cython.double = 0.5 * share
     i: cython.Py_ssize_t
@@ -69,7 +69,7 @@ def friction_of_last(w: cython.pointer(Step), share: cython.double) -> tuple:
             rim_speed: cython.double = w.radius[i] * spin + w.radius[j] * other
             inverse: cython.double = w.inverse_mass[i]
             inverse += w.inverse_mass[j]
-            rubbed += jt * (x * w.normal_y[k] - y * w.normal_x[k] + rim_speed) / inverse
+            by_friction += jt * (x * w.normal_y[k] - y * w.normal_x[k] + rim_speed) / inverse
             rolled += roll * (other - spin) / inverse
     row: cython.pointer(cython.double) = w.contact
     if w.surfaces_good:
@@ -81,6 +81,6 @@ def friction_of_last(w: cython.pointer(Step), share: cython.double) -> tuple:
                     y = w.velocity[2 * i + 1] - half * w.given[2 * i + 1] - row[first + SPEED + 1]
                     spin = w.spin[i] - half * w.given_spin[i]
                     slip: cython.double = x * row[first + NORMAL + 1] - y * row[first + NORMAL] - w.radius[i] * spin
-                    rubbed += row[first + DRAG] * slip / w.inverse_mass[i]
+                    by_friction += row[first + DRAG] * slip / w.inverse_mass[i]
                     rolled += row[first + ROLL] * (spin - row[first + SPIN]) / w.inverse_mass[i]
-    return share * rubbed, share * rolled, work_of_last_motors(w, share)
+    return share * by_friction, share * rolled, work_of_last_motors(w, share)

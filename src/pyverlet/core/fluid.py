@@ -135,8 +135,8 @@ def force_stage(what: cython.p_void, item: cython.int) -> cython.void:
         for k in range(i, end):
             at: int32_t = f.at[k]
             if at < f.owned:
-                f.force[2 * f.slot[at]] += x_sums[k - i]
-                f.force[2 * f.slot[at] + 1] += y_sums[k - i]
+                f.force[2 * f.sorted_index[at]] += x_sums[k - i]
+                f.force[2 * f.sorted_index[at] + 1] += y_sums[k - i]
             else:
                 f.x[at], f.y[at] = x_sums[k - i], y_sums[k - i]  # their memory can be reused
         i = end
@@ -165,12 +165,12 @@ def flow(what: cython.p_void, item: cython.int) -> cython.void:
 
 
 def flow_of_fluid(
-    force, position, velocity, mass, slot, mirrors, periodic, support: real, rest: real, stiffness: real, viscosity: real,
+    force, position, velocity, mass, sorted_index, mirrors, periodic, support: real, rest: real, stiffness: real, viscosity: real,
     threads: cython.size_t, parts: cython.int, density, pressure, work,
 ):  # fmt: skip
     """Add the forces of a fluid to `force`, if that is not None, and write its densities and pressures.
 
-    mass (n,) of its particles; slot (n,) int32: their rows in position, velocity and force (slots, 2). mirrors (k, MIRROR)
+    mass (n,) of its particles; row (n,) int32: their rows in position, velocity and force (n, 2). mirrors (k, MIRROR)
     float64, see `core.fluid_images`; a mirror that is a particle receives the pressure on it. periodic: lowest x and y and
     periods, m. Written: density (n,) kg/m^2 and pressure (n,) N/m, float64. threads, parts: address of a thread team and the
     number of threads to use; 0 for none. stiffness: c^2, m^2/s^2; viscosity: nu, m^2/s. work: a list that keeps arrays between
@@ -178,8 +178,8 @@ def flow_of_fluid(
     """
     fluid: Fluid
     f: cython.pointer(Fluid) = cython.address(fluid)
-    f.mass, f.slot = const_reals(mass), const_small_integers(slot)
-    f.owned, f.mirrors, f.mirror = len(slot), len(mirrors), const_doubles(mirrors)
+    f.mass, f.sorted_index = const_reals(mass), const_small_integers(sorted_index)
+    f.owned, f.mirrors, f.mirror = len(sorted_index), len(mirrors), const_doubles(mirrors)
     f.position, f.velocity = const_reals(position), const_reals(velocity)
     corner = np.array(periodic, float)
     f.periodic = const_doubles(corner)
@@ -191,11 +191,11 @@ def flow_of_fluid(
     f.count, f.cells, f.sorted = f.owned, 20 * f.owned, False
     while not f.sorted:
         if not work or work[0].dtype != position.dtype or len(work[0]) < f.count + LANES or len(work[17]) < f.cells + 2:
-            room = f.count * 5 // 4 + LANES
-            floats = *11 * (room,), 4 * (room // BLOCK_OF_FLUID + 1)
-            work[:] = [np.empty(n, position.dtype) for n in floats] + [np.empty(room, np.int32) for _ in range(5)]
+            capacity = f.count * 5 // 4 + LANES
+            floats = *11 * (capacity,), 4 * (capacity // BLOCK_OF_FLUID + 1)
+            work[:] = [np.empty(n, position.dtype) for n in floats] + [np.empty(capacity, np.int32) for _ in range(5)]
             work.append(np.empty(max(f.cells * 5 // 4, 20 * f.count) + 2, np.int32))
-        f.room, f.most_cells = len(work[0]) - LANES, len(work[17]) - 2
+        f.capacity, f.most_cells = len(work[0]) - LANES, len(work[17]) - 2
         f.sx, f.sy, f.su, f.sv, f.sm, f.share, f.x, f.y, f.vx, f.vy, f.m, f.box = (
             reals(work[0]), reals(work[1]), reals(work[2]), reals(work[3]), reals(work[4]), reals(work[5]), reals(work[6]),
             reals(work[7]), reals(work[8]), reals(work[9]), reals(work[10]), reals(work[11]),

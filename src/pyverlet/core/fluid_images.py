@@ -17,7 +17,7 @@ from pyverlet.core.periodic import nearest_in_double, wrapped
 
 MIRROR = cython.declare(cython.Py_ssize_t, 8)
 """Columns of a mirror: point x and y; radius of a disc about it, m, negative if the fluid is inside, 0 for a line; normal of a
-line, into the fluid; velocity, m/s; slot of the particle that the mirror is, or -1."""
+line, into the fluid; velocity, m/s; row of the particle that the mirror is, or -1."""
 
 BLOCK_OF_FLUID = cython.declare(cython.Py_ssize_t, 256)
 """Particles per work item of a thread."""
@@ -28,20 +28,20 @@ SIDE = cython.declare(cython.Py_ssize_t, 4)
 Fluid = cython.struct(
     owned=cython.Py_ssize_t,  # number of particles, which come first
     count=cython.Py_ssize_t,  # with images; may exceed the room
-    room=cython.Py_ssize_t,
+    capacity=cython.Py_ssize_t,
     box=cython.pointer(real),  # (blocks, 4) lowest x and y, highest x and y of its particles, m
-    position=cython.pointer[cython.const[real]],  # (slots, 2) m
-    velocity=cython.pointer[cython.const[real]],  # (slots, 2) m/s
-    force=cython.pointer(real),  # (slots, 2) N
-    slot=cython.pointer[cython.const[int32_t]],  # (owned,)
+    position=cython.pointer[cython.const[real]],  # (n, 2) m
+    velocity=cython.pointer[cython.const[real]],  # (n, 2) m/s
+    force=cython.pointer(real),  # (n, 2) N
+    sorted_index=cython.pointer[cython.const[int32_t]],  # (owned,)
     mass=cython.pointer[cython.const[real]],  # (owned,) kg
-    x=cython.pointer(real),  # (room,) m
+    x=cython.pointer(real),  # (capacity,) m
     y=cython.pointer(real),
-    vx=cython.pointer(real),  # (room,) m/s
+    vx=cython.pointer(real),  # (capacity,) m/s
     vy=cython.pointer(real),
-    m=cython.pointer(real),  # (room,) kg
-    owner=cython.pointer(int32_t),  # (room,) particle whose image it is; itself for particles
-    struck=cython.pointer(int32_t),  # (room,) slot of the disc that receives the pressure on it, or -1
+    m=cython.pointer(real),  # (capacity,) kg
+    owner=cython.pointer(int32_t),  # (capacity,) particle whose image it is; itself for particles
+    struck=cython.pointer(int32_t),  # (capacity,) row of the disc that receives the pressure on it, or -1
     mirrors=cython.Py_ssize_t,
     mirror=cython.pointer[cython.const[cython.double]],  # (mirrors, MIRROR)
     periodic=cython.pointer[cython.const[cython.double]],  # lowest x and y, and periods, m
@@ -112,7 +112,7 @@ def add_images(
             near: cython.bint = p[2] == 0 or p[0] - f.support < px < p[0] + p[2] + f.support
             if struck == -2 if here else not (near and (p[3] == 0 or p[1] - f.support < py < p[1] + p[3] + f.support)):
                 continue
-            if at < f.room:
+            if at < f.capacity:
                 f.x[at], f.y[at], f.vx[at], f.vy[at] = (
                     cython.cast(real, px), cython.cast(real, py), cython.cast(real, vx), cython.cast(real, vy),
                 )  # fmt: skip
@@ -195,7 +195,7 @@ def copy_stage(what: cython.p_void, item: cython.int) -> cython.void:
     high_y: real = -INFINITY
     k: cython.Py_ssize_t
     for k in range(BLOCK_OF_FLUID * item, min(BLOCK_OF_FLUID * (item + 1), f.owned)):
-        s: cython.Py_ssize_t = 2 * f.slot[k]
+        s: cython.Py_ssize_t = 2 * f.sorted_index[k]
         x: real = wrapped(f.position[s], p[0], p[2])
         y: real = wrapped(f.position[s + 1], p[1], p[3])
         f.x[k], f.y[k], f.vx[k], f.vy[k] = x, y, f.velocity[s], f.velocity[s + 1]
@@ -269,7 +269,7 @@ def sort_fluid(f: cython.pointer(Fluid)) -> cython.bint:
     k: cython.Py_ssize_t
     team_stage(f.threads, copy_stage, f, blocks)
     make_images(f)
-    if f.count > f.room:
+    if f.count > f.capacity:
         return False
     lay_cells(f, blocks)
     if f.cells > f.most_cells:

@@ -167,13 +167,13 @@ def thermalize(
 
     Positions move by `ahead` s times the change of velocity. Returns the kinetic energy gained, J.
 
-    particle (n,) int32: index in `number`, int64, of each slot; when: (seed, frame, substep), integers from 0 on.
+    particle (n,) int32: index in `number`, int64, of each row; when: (seed, frame, substep), integers from 0 on.
     thermal: kT, J.
     """
     v: cython.pointer(real) = reals(velocity)
     x: cython.pointer(real) = reals(position)
     light: cython.pointer[cython.const[real]] = const_reals(inverse_mass)
-    who: cython.pointer[cython.const[int32_t]] = const_small_integers(particle)
+    which: cython.pointer[cython.const[int32_t]] = const_small_integers(particle)
     name: cython.pointer[cython.const[int64_t]] = const_integers(number)
     count: cython.Py_ssize_t = len(velocity)
     seed: int64_t = when[0]
@@ -186,7 +186,7 @@ def thermalize(
             w: cython.double = light[i]
             if not w > 0:
                 continue
-            a: uint64_t = next_key(key, name[who[i]])
+            a: uint64_t = next_key(key, name[which[i]])
             b: uint64_t = scrambled(a + GAMMA)
             # Box and Muller 1958: two normal numbers from two uniform ones, the first of which is never 0.
             size: cython.double = sqrt(-2.0 * log((cython.cast(cython.double, a >> 11) + 0.5) * UNIT))

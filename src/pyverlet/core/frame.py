@@ -23,26 +23,26 @@ from cython.cimports.lanes import real
 from cython.cimports.libc.math import sqrt
 from cython.cimports.team import team_enter, team_stage
 
-from pyverlet.core.blows import begin_volley, share_blows
 from pyverlet.core.cells import BLOCK
+from pyverlet.core.contact_recording import pair_records_stage
 from pyverlet.core.contacts import bounce_again, hold_contacts, solve_contacts
-from pyverlet.core.hearing import hear_held, hear_loads, hear_surface_loads
+from pyverlet.core.event_recording import record_held, record_loads, record_surface_loads
 from pyverlet.core.kernels import inlined, kernel
-from pyverlet.core.link_motors import book_motors, note_spun
-from pyverlet.core.links import begin_links, end_links, remember_motors_stage, solve_links, temper_links
-from pyverlet.core.noting import note_stage
+from pyverlet.core.link_motors import add_motor_work, keep_motor_spin
+from pyverlet.core.links import begin_links, end_links, limit_warm_links, remember_motors_stage, solve_links
 from pyverlet.core.obstacles import place_moving
 from pyverlet.core.pair_groups import busy_group, each_busy
 from pyverlet.core.particle_stages import drift, kick_stage, moves_stage, remember_stage
 from pyverlet.core.relaxation import energy_before, relax
 from pyverlet.core.sensors import sense
+from pyverlet.core.shared_impacts import begin_impacts, share_impacts
 from pyverlet.core.spans import INTEGRATE, LINKS, NOTES, PAIRS, SURFACES
 from pyverlet.core.step import NEAR, OPEN, Step
 from pyverlet.core.surface_contacts import forget_jam, hold_surfaces, relax_surfaces, warm_surfaces
 from pyverlet.core.surface_sides import keep_in_sight, keep_inside, keep_sides
 from pyverlet.core.surfaces import bounce_surfaces, has_rebounds, keeps_clear
 from pyverlet.core.warm_start import warm_start
-from pyverlet.core.work import book_drift, book_end, book_grips, book_rubbing, book_start
+from pyverlet.core.work import add_drift_work, add_end_work, add_friction_work, add_grip_work, add_start_work
 
 ROUNDS = cython.declare(cython.int, 2)
 ROUGH_ROUNDS = cython.declare(cython.int, 4)
@@ -86,8 +86,8 @@ def hold_block(w: cython.pointer(Step), block: cython.Py_ssize_t) -> cython.void
         x: real = v[width * i]
         y: real = v[width * i + 1]
         hold_surfaces(w, i, clear)
-        if w.listening:
-            hear_held(w, i, x, y)
+        if w.records_events:
+            record_held(w, i, x, y)
 
 
 @kernel
@@ -123,16 +123,16 @@ def drift_stage(what: cython.p_void, item: cython.int) -> cython.void:
             keep_in_sight(w, block)
         if w.solids > 0:
             keep_sides(w, block)
-            for n in range(a, a + w.at_surface_count[block] if w.room != OPEN else a):
+            for n in range(a, a + w.at_surface_count[block] if w.boundary != OPEN else a):
                 keep_inside(w, w.at_surface[n], SMALL_OUT)
-    elif w.room != OPEN:
+    elif w.boundary != OPEN:
         for n in range(a, min(a + BLOCK, w.count)):
             keep_inside(w, n, LINKED_OUT)
-    if w.listening and w.sensors > 0:
+    if w.records_events and w.sensors > 0:
         sense(w, block)
     drift(w, a, min(a + BLOCK, w.count), block)
-    if w.booking:
-        book_drift(w, block)
+    if w.records_work:
+        add_drift_work(w, block)
     if w.relaxes > 0:
         for n in range(a, a + w.at_surface_count[block]):
             relax_surfaces(w, w.at_surface[n], False)
@@ -190,27 +190,27 @@ def hold_stage(what: cython.p_void, item: cython.int) -> cython.void:
 
 
 @kernel
-def rubbing_stage(what: cython.p_void, item: cython.int) -> cython.void:
+def friction_stage(what: cython.p_void, item: cython.int) -> cython.void:
     """Book the friction work of a group's pairs."""
     w: cython.pointer(Step) = cython.cast(cython.pointer(Step), what)
-    book_rubbing(w, busy_group(w, item))
+    add_friction_work(w, busy_group(w, item))
 
 
 @kernel
-def hear_stage(what: cython.p_void, item: cython.int) -> cython.void:
+def loads_stage(what: cython.p_void, item: cython.int) -> cython.void:
     """Record which pairs of a group touch."""
     w: cython.pointer(Step) = cython.cast(cython.pointer(Step), what)
-    hear_loads(w, busy_group(w, item))
+    record_loads(w, busy_group(w, item))
 
 
 @kernel
-def hear_surfaces_stage(what: cython.p_void, item: cython.int) -> cython.void:
+def surface_loads_stage(what: cython.p_void, item: cython.int) -> cython.void:
     """Record which surfaces the particles of a block touch."""
     w: cython.pointer(Step) = cython.cast(cython.pointer(Step), what)
     block: cython.Py_ssize_t = w.awake[item]
     n: cython.Py_ssize_t
     for n in range(block * BLOCK, block * BLOCK + w.at_surface_count[block]):
-        hear_surface_loads(w, w.at_surface[n])
+        record_surface_loads(w, w.at_surface[n])
 
 
 @kernel
@@ -222,9 +222,9 @@ def substep(w: cython.pointer(Step), blocks: cython.int) -> cython.bint:
     stale: cython.bint = False
     team_enter(w.team, INTEGRATE)
     team_stage(w.team, kick_stage, w, w.awake_count)
-    if w.booking:
+    if w.records_work:
         team_enter(w.team, NOTES)
-        team_stage(w.team, book_start, w, w.awake_count)
+        team_stage(w.team, add_start_work, w, w.awake_count)
     for b in range(blocks):
         most = max(most, w.fastest[b])
     fastest: real = cython.cast(real, sqrt(most))
@@ -232,12 +232,12 @@ def substep(w: cython.pointer(Step), blocks: cython.int) -> cython.bint:
     w.least_bounce = fastest * cython.cast(real, 1e-14 if cython.sizeof(real) == 8 else 2e-6)
     if w.falls_free:
         w.least_bounce = max(w.rest_speed, w.least_bounce)
-    surfaces: cython.bint = w.room != OPEN or w.solids > 0 or w.pins
+    surfaces: cython.bint = w.boundary != OPEN or w.solids > 0 or w.pins
     most_after: cython.double = energy_before(w, fastest)
     if w.linked:
         team_enter(w.team, LINKS)
         begin_links(w, surfaces)
-        begin_volley(w, blocks)
+        begin_impacts(w, blocks)
     team_enter(w.team, SURFACES)
     place_moving(w)
     if surfaces:
@@ -245,7 +245,7 @@ def substep(w: cython.pointer(Step), blocks: cython.int) -> cython.bint:
     team_enter(w.team, PAIRS)
     each_busy(w, warm_start_stage)
     if w.linked:
-        temper_links(w)
+        limit_warm_links(w)
     if surfaces:
         team_enter(w.team, SURFACES)
         team_stage(w.team, hold_surfaces_stage, w, w.awake_count)
@@ -254,7 +254,7 @@ def substep(w: cython.pointer(Step), blocks: cython.int) -> cython.bint:
     bounce_on(w)
     if w.linked:
         team_enter(w.team, LINKS)
-        share_blows(w, blocks)
+        share_impacts(w, blocks)
         if surfaces:
             team_stage(w.team, hold_on_stage, w, w.awake_count)
         rests: cython.bint = fastest < min(w.rest_speed, w.push)
@@ -268,7 +268,7 @@ def substep(w: cython.pointer(Step), blocks: cython.int) -> cython.bint:
                     each_busy(w, hold_stage)
                 if surfaces:
                     team_stage(w.team, hold_on_stage, w, w.awake_count)
-            share_blows(w, blocks)
+            share_impacts(w, blocks)
             solve_links(w, turn > 0, turn + 1 == rounds)
     w.turned = False
     team_enter(w.team, INTEGRATE)
@@ -282,20 +282,20 @@ def substep(w: cython.pointer(Step), blocks: cython.int) -> cython.bint:
         team_enter(w.team, LINKS)
         end_links(w)
     team_enter(w.team, NOTES)
-    if w.booking and w.rough:
-        each_busy(w, rubbing_stage)
-        team_stage(w.team, book_grips, w, w.awake_count)
+    if w.records_work and w.rough:
+        each_busy(w, friction_stage)
+        team_stage(w.team, add_grip_work, w, w.awake_count)
     if w.linked and w.link_table.motors:
-        if w.booking:
-            book_motors(w)
-        note_spun(w)
-    if w.booking:
-        team_stage(w.team, book_end, w, w.awake_count)
-    if w.noting:
-        each_busy(w, note_stage)
-    if w.listening:
-        each_busy(w, hear_stage)
-        team_stage(w.team, hear_surfaces_stage, w, w.awake_count)
+        if w.records_work:
+            add_motor_work(w)
+        keep_motor_spin(w)
+    if w.records_work:
+        team_stage(w.team, add_end_work, w, w.awake_count)
+    if w.records_contacts:
+        each_busy(w, pair_records_stage)
+    if w.records_events:
+        each_busy(w, loads_stage)
+        team_stage(w.team, surface_loads_stage, w, w.awake_count)
     team_enter(w.team, PAIRS)
     if w.rough or w.substep + 1 == w.substeps:  # without friction, only the last impulses are used
         team_stage(w.team, remember_stage, w, w.awake_count)

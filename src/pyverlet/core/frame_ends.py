@@ -63,7 +63,7 @@ def begin_stage(what: cython.p_void, block: cython.int) -> cython.void:
 @kernel
 def find_awake(w: cython.pointer(Step), blocks: cython.int) -> cython.void:
     """List the blocks that substeps visit: those that are not still, or all if sensors or a ledger need every particle."""
-    every: cython.bint = (w.listening and w.sensors > 0) or w.booking
+    every: cython.bint = (w.records_events and w.sensors > 0) or w.records_work
     b: int32_t
     w.awake_count = 0
     for b in range(blocks):

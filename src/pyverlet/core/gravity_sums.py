@@ -177,19 +177,19 @@ def pull_all(what: cython.p_void, item: cython.int) -> cython.void:
 
 
 def gravitate(
-    force, position, mass, slot, strength: cython.double, softening: cython.double, theta: cython.double, periodic,
+    force, position, mass, sorted_index, strength: cython.double, softening: cython.double, theta: cython.double, periodic,
     threads: cython.size_t, parts: cython.int, work=None, energies: cython.bint = True,
 ) -> float:  # fmt: skip
-    """Attraction between all pairs of the particles in these slots: F = strength m_i m_j d / (|d|^2 + softening^2)^(3/2).
+    """Attraction between all pairs of the particles in these rows: F = strength m_i m_j d / (|d|^2 + softening^2)^(3/2).
 
-    Returns the potential energy, J, or 0 unless `energies`. The forces sum to 0 up to rounding. slot: (k,) int32. periodic:
+    Returns the potential energy, J, or 0 unless `energies`. The forces sum to 0, rounded. sorted_index: (k,) int32. periodic:
     lowest x and y and periods of the room, m. threads, parts: address of a thread team and the number of threads to use; 0 for
     none. work: a list that keeps arrays between calls, as allocating takes longer than using them. Particles at NaN get NaN;
     pinned ones get no force.
     """
     f: cython.pointer(real) = reals(force)
-    who: cython.pointer[cython.const[int32_t]] = const_small_integers(slot)
-    all_: cython.Py_ssize_t = len(slot)
+    which: cython.pointer[cython.const[int32_t]] = const_small_integers(sorted_index)
+    all_: cython.Py_ssize_t = len(sorted_index)
     tree: Tree
     t: cython.pointer(Tree) = cython.address(tree)
     a = [] if work is None else work
@@ -206,7 +206,7 @@ def gravitate(
     t.threads = cython.cast(cython.pointer(thread_team), threads)
     t.count, t.energies = 0, energies
     corner = np.array(periodic, float)
-    room: cython.pointer[cython.const[cython.double]] = const_doubles(corner)
+    span: cython.pointer[cython.const[cython.double]] = const_doubles(corner)
     total: cython.double = 0
     largest: cython.double = 0
     unit: cython.double = 1  # m, a power of two
@@ -214,7 +214,7 @@ def gravitate(
     i: cython.Py_ssize_t
     with cython.nogil:
         for k in range(all_):
-            i = who[k]
+            i = which[k]
             if not (isfinite(at[2 * i]) and isfinite(at[2 * i + 1])):
                 f[2 * i], f[2 * i + 1] = cython.cast(real, NAN), cython.cast(real, NAN)
             elif m[i] < INFINITY:
@@ -228,8 +228,8 @@ def gravitate(
             while unit > TINY and unit >= 2 * largest:
                 unit *= 0.5
             t.per, t.share = 1 / unit, 1 / total
-            t.low_x, t.low_y = room[0], room[1]
-            t.period_x, t.period_y = cython.cast(real, room[2] * t.per), cython.cast(real, room[3] * t.per)
+            t.low_x, t.low_y = span[0], span[1]
+            t.period_x, t.period_y = cython.cast(real, span[2] * t.per), cython.cast(real, span[3] * t.per)
             t.theta2, t.softening2 = cython.cast(real, theta * theta), cython.cast(real, softening / unit * softening / unit)
             t.least = cython.cast(real, 1e-290 if cython.sizeof(real) == 8 else 1e-37)
             t.closest = cython.cast(real, 1e-110 if cython.sizeof(real) == 8 else 1e-14)

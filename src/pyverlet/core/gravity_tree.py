@@ -42,8 +42,8 @@ half their trace; bounds, lowest x and y, highest x and y."""
 
 Tree = cython.struct(
     count=cython.Py_ssize_t,
-    at=cython.pointer[cython.const[real]],  # (slots, 2) m
-    mass=cython.pointer[cython.const[real]],  # (slots,) kg
+    at=cython.pointer[cython.const[real]],  # (n, 2) m
+    mass=cython.pointer[cython.const[real]],  # (n,) kg
     per=cython.double,  # units per metre, and per kilogram
     share=cython.double,
     low_x=cython.double,  # corner of a periodic room, m, and its periods, in units; 0: none

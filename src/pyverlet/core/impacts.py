@@ -15,11 +15,11 @@ from cython.cimports.lanes import real
 from cython.cimports.libc.math import fabs, sqrt
 from cython.cimports.libc.stdint import int64_t
 
-from pyverlet.core.hearing import hear_blow, hear_pair, least_of_pair
+from pyverlet.core.event_recording import least_of_pair, record_impact, record_pair
 from pyverlet.core.kernels import inlined, kernel
-from pyverlet.core.rebounds import BLOW, REBOUND, node_of, note_rebound
+from pyverlet.core.rebounds import IMPACT, REBOUND, node_of, store_rebound
 from pyverlet.core.step import MOST_JOINT, Step
-from pyverlet.core.work import book_impact
+from pyverlet.core.work import add_impact_work
 
 NEVER = cython.declare(cython.double, 1e300)
 SAME_TIME = cython.declare(cython.double, 1e-3)  # fraction of h
@@ -29,7 +29,7 @@ in the next substep."""
 
 JOINT_SWEEPS = cython.declare(cython.int, 200)
 
-Meeting = cython.struct(
+PairMotion = cython.struct(
     i=cython.Py_ssize_t,
     j=cython.Py_ssize_t,
     part=cython.double,  # fraction of i in the inverse mass of the pair
@@ -43,9 +43,9 @@ Meeting = cython.struct(
 
 
 @inlined
-def meeting(w: cython.pointer(Step), k: cython.Py_ssize_t) -> Meeting:
+def pair_motion(w: cython.pointer(Step), k: cython.Py_ssize_t) -> PairMotion:
     """The relative motion of pair k."""
-    m: Meeting
+    m: PairMotion
     m.i, m.j = w.i[k], w.j[k]
     m.part = w.share[k * w.varied]
     m.px = w.gap_x[k] + (w.moved[2 * m.j] - w.moved[2 * m.i])
@@ -60,7 +60,7 @@ def meeting(w: cython.pointer(Step), k: cython.Py_ssize_t) -> Meeting:
 
 
 @kernel
-def time_of_impact(w: cython.pointer(Step), k: cython.Py_ssize_t, m: cython.pointer(Meeting)) -> cython.double:
+def time_of_impact(w: cython.pointer(Step), k: cython.Py_ssize_t, m: cython.pointer(PairMotion)) -> cython.double:
     """Time at which pair k begins to touch, s into the substep; NEVER if not in this substep.
 
     The path of a particle after an impact begins at its last one. Pairs that overlap touch at once.
@@ -124,30 +124,30 @@ def strike(
         w.free_spin[i] += cython.cast(real, turn)
     move_path(w, i, dx, dy, t)
     if w.linked and node_of(w, i) >= 0:
-        w.blow[BLOW * i] += dx
-        w.blow[BLOW * i + 1] += dy
-    if w.booking:
-        book_impact(w, i, dx, dy, turn, t)
+        w.impact[IMPACT * i] += dx
+        w.impact[IMPACT * i + 1] += dy
+    if w.records_work:
+        add_impact_work(w, i, dx, dy, turn, t)
 
 
 @kernel
 def strike_pair(
-    w: cython.pointer(Step), k: cython.Py_ssize_t, m: cython.pointer(Meeting), jx: cython.double, jy: cython.double,
+    w: cython.pointer(Step), k: cython.Py_ssize_t, m: cython.pointer(PairMotion), jx: cython.double, jy: cython.double,
     jt: cython.double, t: cython.double,
 ) -> cython.void:  # fmt: skip
     """Apply the impulse (jx, jy), over the reduced mass, to j and its opposite to i; its tangential part jt turns both."""
     at: cython.Py_ssize_t = k * w.mixed
     rest: cython.double = 1 - m.part
-    if w.noting:
-        w.noted_x[k] += cython.cast(real, jx)
-        w.noted_y[k] += cython.cast(real, jy)
+    if w.records_contacts:
+        w.summed_x[k] += cython.cast(real, jx)
+        w.summed_y[k] += cython.cast(real, jy)
     strike(w, m.i, -jx * m.part, -jy * m.part, jt * m.part * w.turn_i[at], t)
     strike(w, m.j, jx * rest, jy * rest, jt * rest * w.turn_j[at], t)
 
 
 @kernel
-def rub(
-    w: cython.pointer(Step), k: cython.Py_ssize_t, m: cython.pointer(Meeting), nx: cython.double, ny: cython.double,
+def apply_friction(
+    w: cython.pointer(Step), k: cython.Py_ssize_t, m: cython.pointer(PairMotion), nx: cython.double, ny: cython.double,
     pushed: cython.double, distance: cython.double, t: cython.double,
 ) -> cython.void:  # fmt: skip
     """Friction of an impact with normal impulse `pushed` along n. Lever arms add up to the distance: angular momentum is kept."""
@@ -167,7 +167,7 @@ def rub(
 
 
 @kernel
-def note_pair_rebound(
+def store_pair_rebound(
     w: cython.pointer(Step), k: cython.Py_ssize_t, x: cython.double, y: cython.double, given: cython.double, t: cython.double
 ) -> cython.void:
     """Record that pair k bounced with `given` along (x, y)."""
@@ -175,14 +175,14 @@ def note_pair_rebound(
     j: cython.Py_ssize_t = w.j[k]
     e: cython.double = w.restitution[k * w.mixed]
     if w.linked and e > 0 and given > 0 and (node_of(w, i) >= 0 or node_of(w, j) >= 0):
-        now: Meeting = meeting(w, k)
-        note_rebound(w, w.pair_rebound, REBOUND * k, x, y, now.ux * x + now.uy * y, given, e, t)
+        now: PairMotion = pair_motion(w, k)
+        store_rebound(w, w.pair_rebound, REBOUND * k, x, y, now.ux * x + now.uy * y, given, e, t)
 
 
 @kernel
 def impact(w: cython.pointer(Step), k: cython.Py_ssize_t) -> cython.bint:
     """Resolve the impact of pair k, if it has one that is faster than resting contacts; returns whether it did."""
-    m: Meeting = meeting(w, k)
+    m: PairMotion = pair_motion(w, k)
     t: cython.double = time_of_impact(w, k, cython.address(m))
     if t == NEVER:
         return False
@@ -201,11 +201,11 @@ def impact(w: cython.pointer(Step), k: cython.Py_ssize_t) -> cython.bint:
     e: cython.double = w.restitution[k * w.mixed]
     push: cython.double = -(1 + e) * speed
     strike_pair(w, k, cython.address(m), push * x, push * y, 0, t)
-    rub(w, k, cython.address(m), x, y, push, distance, t)
-    note_pair_rebound(w, k, x, y, push, t)
-    hear_pair(w, k, -speed, -e * speed)
-    if w.noting:
-        w.noted_virial[k] += cython.cast(real, push * distance)
+    apply_friction(w, k, cython.address(m), x, y, push, distance, t)
+    store_pair_rebound(w, k, x, y, push, t)
+    record_pair(w, k, -speed, -e * speed)
+    if w.records_contacts:
+        w.summed_virial[k] += cython.cast(real, push * distance)
     w.thrown[m.i] += 1
     w.thrown[m.j] += 1
     return True
@@ -214,7 +214,7 @@ def impact(w: cython.pointer(Step), k: cython.Py_ssize_t) -> cython.bint:
 @kernel
 def joint_impact(w: cython.pointer(Step), hits: cython.pointer(int64_t), count: cython.int, t: cython.double) -> cython.void:
     """Pairs that share particles and meet at the same time: the impulses that stop them all, times 1 + e."""
-    m: Meeting[16]
+    m: PairMotion[16]
     nx: cython.double[16]
     ny: cython.double[16]
     given: cython.double[16]
@@ -223,7 +223,7 @@ def joint_impact(w: cython.pointer(Step), hits: cython.pointer(int64_t), count: 
     back: cython.double = t - 0.5 * cython.cast(cython.double, w.h)
     half: cython.double = 0.5 * t * (w.h - t)
     for g in range(count):
-        m[g] = meeting(w, hits[g])
+        m[g] = pair_motion(w, hits[g])
         x: cython.double = m[g].px + m[g].ux * t - m[g].ax * half
         y: cython.double = m[g].py + m[g].uy * t - m[g].ay * half
         distance: cython.double = sqrt(x * x + y * y)
@@ -233,7 +233,7 @@ def joint_impact(w: cython.pointer(Step), hits: cython.pointer(int64_t), count: 
     for _ in range(JOINT_SWEEPS):
         largest: cython.double = 0
         for g in range(count):
-            now: Meeting = meeting(w, hits[g])
+            now: PairMotion = pair_motion(w, hits[g])
             speed: cython.double = (now.ux + now.ax * back) * nx[g] + (now.uy + now.ay * back) * ny[g]
             after: cython.double = max(given[g] - speed, 0.0)
             change: cython.double = after - given[g]
@@ -249,14 +249,14 @@ def joint_impact(w: cython.pointer(Step), hits: cython.pointer(int64_t), count: 
         strike_pair(w, hits[g], cython.address(m[g]), more * nx[g], more * ny[g], 0, t)
     for g in range(count):
         e: cython.double = w.restitution[hits[g] * w.mixed]
-        rub(w, hits[g], cython.address(m[g]), nx[g], ny[g], (1 + e) * given[g], apart[g], t)
+        apply_friction(w, hits[g], cython.address(m[g]), nx[g], ny[g], (1 + e) * given[g], apart[g], t)
         w.thrown[m[g].i] += 1
         w.thrown[m[g].j] += 1
-        note_pair_rebound(w, hits[g], nx[g], ny[g], (1 + e) * given[g], t)
-        if w.noting:
-            w.noted_virial[hits[g]] += cython.cast(real, (1 + e) * given[g] * apart[g])
+        store_pair_rebound(w, hits[g], nx[g], ny[g], (1 + e) * given[g], t)
+        if w.records_contacts:
+            w.summed_virial[hits[g]] += cython.cast(real, (1 + e) * given[g] * apart[g])
         if given[g] > 0:
-            hear_blow(w, hits[g], came[g], (1 + e) * given[g], e * given[g])
+            record_impact(w, hits[g], came[g], (1 + e) * given[g], e * given[g])
 
 
 @kernel
@@ -282,7 +282,7 @@ def resolve_impacts(w: cython.pointer(Step), first: cython.Py_ssize_t, count: cy
     kept: cython.Py_ssize_t = first
     for a in range(first, first + count):
         k: cython.Py_ssize_t = w.hit[a]
-        m: Meeting = meeting(w, k)
+        m: PairMotion = pair_motion(w, k)
         if max(w.thrown[m.i], w.thrown[m.j]) >= MOST_PAIR_BOUNCES:
             continue
         t: cython.double = time_of_impact(w, k, cython.address(m))

@@ -43,7 +43,7 @@ STRAIGHT = cython.declare(cython.double, 0.96)
 def begin_row(k: cython.pointer(Links), r: cython.Py_ssize_t) -> cython.void:
     """Measure row r, compute its coefficients, and how it turns."""
     e: cython.Py_ssize_t = k.first[r]
-    k.blow[r] = k.ahead[3 * r] = k.ahead[3 * r + 1] = k.ahead[3 * r + 2] = 0
+    k.impact[r] = k.ahead[3 * r] = k.ahead[3 * r + 1] = k.ahead[3 * r + 2] = 0
     if k.intact[r] == 0:
         return
     value: cython.double = measure_row(k, r, 0)
@@ -97,7 +97,7 @@ def begin_block(k: cython.pointer(Links), b: cython.Py_ssize_t) -> cython.void:
 
 
 @kernel
-def take_back_row(k: cython.pointer(Links), r: cython.Py_ssize_t) -> cython.void:
+def undo_row(k: cython.pointer(Links), r: cython.Py_ssize_t) -> cython.void:
     """Reduce row r to the part of its impulse that stays when it is solved."""
     k.impulse[r] *= k.keeps[r]
     if k.kind[r] == DISTANCE:
@@ -258,7 +258,7 @@ def end_row(k: cython.pointer(Links), r: cython.Py_ssize_t, mean: cython.double)
     """Update the mean tension of row r; if it is too large, the row breaks."""
     if k.intact[r] == 0:
         return
-    k.pull[r] = averaged(k.pull[r], -(k.impulse[r] + k.blow[r]) / k.kick, mean)
+    k.pull[r] = averaged(k.pull[r], -(k.impulse[r] + k.impact[r]) / k.kick, mean)
     if k.pull[r] > k.strength[r] or -k.pull[r] > k.strength[r]:
         k.intact[r] = 0
         k.impulse[r] = 0

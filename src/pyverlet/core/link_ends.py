@@ -77,15 +77,15 @@ def show_links(w: cython.pointer(Step), half: cython.double, kick: cython.double
     axis: cython.int
     for i in range(k.count):
         for axis in range(2):
-            k.x[2 * i + axis] = w.position[2 * k.slot[i] + axis]
-            k.u[2 * i + axis] = w.velocity[2 * k.slot[i] + axis]
-        k.own[i] = k.weight[i] = w.inverse_mass[k.slot[i]]
+            k.x[2 * i + axis] = w.position[2 * k.sorted_index[i] + axis]
+            k.u[2 * i + axis] = w.velocity[2 * k.sorted_index[i] + axis]
+        k.own[i] = k.weight[i] = w.inverse_mass[k.sorted_index[i]]
         k.held[i] = -1
     turn_impulses(k, half / kick, half)
     project(w)
     for i in range(k.count):
         for axis in range(2):
-            at: cython.Py_ssize_t = 2 * k.slot[i] + axis
+            at: cython.Py_ssize_t = 2 * k.sorted_index[i] + axis
             shown: real = cython.cast(real, k.u[2 * i + axis])
             change: real = shown - w.velocity[at]
             w.given[at] += cython.cast(real, change * kick / half)

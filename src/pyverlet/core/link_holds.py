@@ -11,8 +11,8 @@ from pyverlet.core.kernels import inlined, kernel
 from pyverlet.core.link_arrays import Links
 from pyverlet.core.step import Step
 from pyverlet.core.surface_contacts import excess_speed, keep_with_pair, passes_by
-from pyverlet.core.surface_rows import BEFORE_CHAIN, CONTACT, DRAG, GAP, NORMAL, PUSH, RUB, SPEED
-from pyverlet.core.surfaces import note_surface
+from pyverlet.core.surface_rows import BEFORE_CHAIN, CONTACT, COULOMB, DRAG, GAP, NORMAL, PUSH, SPEED
+from pyverlet.core.surfaces import add_surface_impulse
 
 WEDGED = cython.declare(cython.double, 1e-3)
 """If surfaces leave a row less than this fraction of its mobility, it is solved without them, and they follow."""
@@ -23,8 +23,8 @@ Mobility = cython.struct(xx=cython.double, xy=cython.double, yy=cython.double)
 @inlined
 def share_along(k: cython.pointer(Links), i: cython.Py_ssize_t, c: cython.Py_ssize_t) -> cython.double:
     """Fraction of a tangential impulse that moves linked particle i: a disc with grip also rolls, and keeps two thirds."""
-    grips: cython.bint = fabs(k.contact[CONTACT * c + DRAG]) < k.contact[CONTACT * c + RUB] * k.contact[CONTACT * c + PUSH]
-    return k.ease[i] / (1 + k.ease[i]) if k.rough and k.rubs[i] and grips else 1.0
+    grips: cython.bint = fabs(k.contact[CONTACT * c + DRAG]) < k.contact[CONTACT * c + COULOMB] * k.contact[CONTACT * c + PUSH]
+    return k.ease[i] / (1 + k.ease[i]) if k.rough and k.has_friction[i] and grips else 1.0
 
 
 @inlined
@@ -63,13 +63,13 @@ def press(
     k.contact[at + PUSH] += into
     k.u[2 * i] -= into * nx
     k.u[2 * i + 1] -= into * ny
-    if k.rough and k.rubs[i]:
-        most: cython.double = k.contact[at + RUB] * k.contact[at + PUSH]
-        rubbed: cython.double = min(max(k.contact[at + DRAG] - slip / (1 + k.ease[i]), -most), most) - k.contact[at + DRAG]
-        k.contact[at + DRAG] += rubbed
-        k.u[2 * i] += rubbed * ny
-        k.u[2 * i + 1] -= rubbed * nx
-        k.rim[i] -= k.ease[i] * rubbed
+    if k.rough and k.has_friction[i]:
+        most: cython.double = k.contact[at + COULOMB] * k.contact[at + PUSH]
+        tangent: cython.double = min(max(k.contact[at + DRAG] - slip / (1 + k.ease[i]), -most), most) - k.contact[at + DRAG]
+        k.contact[at + DRAG] += tangent
+        k.u[2 * i] += tangent * ny
+        k.u[2 * i + 1] -= tangent * nx
+        k.rim[i] -= k.ease[i] * tangent
 
 
 @inlined
@@ -117,7 +117,7 @@ def find_hold(w: cython.pointer(Step), i: cython.Py_ssize_t) -> cython.void:
     most: cython.double = 0
     k.held[i] = -1
     if k.own[i] > 0 and k.surfaces:
-        for c in range(w.contact_begin[k.slot[i]], w.contact_end[k.slot[i]]):
+        for c in range(w.contact_begin[k.sorted_index[i]], w.contact_end[k.sorted_index[i]]):
             if w.contact[CONTACT * c + PUSH] > most and w.contact[CONTACT * c + GAP] > -k.deepest:
                 most = w.contact[CONTACT * c + PUSH]
                 k.held[i] = cython.cast(int32_t, c)
@@ -130,7 +130,7 @@ def save_node(w: cython.pointer(Step), i: cython.Py_ssize_t) -> cython.void:
     c: cython.Py_ssize_t
     k.begun[3 * i], k.begun[3 * i + 1], k.begun[3 * i + 2] = k.u[2 * i], k.u[2 * i + 1], k.rim[i]
     if k.surfaces:
-        for c in range(w.contact_begin[k.slot[i]], w.contact_end[k.slot[i]]):
+        for c in range(w.contact_begin[k.sorted_index[i]], w.contact_end[k.sorted_index[i]]):
             w.contact[CONTACT * c + BEFORE_CHAIN] = w.contact[CONTACT * c + PUSH]
             w.contact[CONTACT * c + BEFORE_CHAIN + 1] = w.contact[CONTACT * c + DRAG]
 
@@ -142,7 +142,7 @@ def restore_node(w: cython.pointer(Step), i: cython.Py_ssize_t) -> cython.void:
     c: cython.Py_ssize_t
     k.u[2 * i], k.u[2 * i + 1], k.rim[i] = k.begun[3 * i], k.begun[3 * i + 1], k.begun[3 * i + 2]
     if k.surfaces:
-        for c in range(w.contact_begin[k.slot[i]], w.contact_end[k.slot[i]]):
+        for c in range(w.contact_begin[k.sorted_index[i]], w.contact_end[k.sorted_index[i]]):
             w.contact[CONTACT * c + PUSH] = w.contact[CONTACT * c + BEFORE_CHAIN]
             w.contact[CONTACT * c + DRAG] = w.contact[CONTACT * c + BEFORE_CHAIN + 1]
     find_hold(w, i)
@@ -155,12 +155,12 @@ def hold_node(w: cython.pointer(Step), i: cython.Py_ssize_t) -> cython.void:
     c: cython.Py_ssize_t
     if k.own[i] == 0 or k.weight[i] == 0 or not k.surfaces:
         return
-    for c in range(w.contact_begin[k.slot[i]], w.contact_end[k.slot[i]]):
+    for c in range(w.contact_begin[k.sorted_index[i]], w.contact_end[k.sorted_index[i]]):
         first: cython.Py_ssize_t = CONTACT * c
         if w.contact[first + GAP] < -k.deepest:
             continue
         before: cython.double = w.contact[first + PUSH]
-        if before > 0 or (w.contact[first + GAP] < w.far and not passes_by(w, k.slot[i], c, k.u[2 * i], k.u[2 * i + 1])):
+        if before > 0 or (w.contact[first + GAP] < w.far and not passes_by(w, k.sorted_index[i], c, k.u[2 * i], k.u[2 * i + 1])):
             x: cython.double = k.u[2 * i] - w.contact[first + SPEED]
             y: cython.double = k.u[2 * i + 1] - w.contact[first + SPEED + 1]
             slip: cython.double = x * w.contact[first + NORMAL + 1] - y * w.contact[first + NORMAL] - k.rim[i]
@@ -169,18 +169,18 @@ def hold_node(w: cython.pointer(Step), i: cython.Py_ssize_t) -> cython.void:
 
 
 @kernel
-def note_holds(w: cython.pointer(Step), i: cython.Py_ssize_t, share: cython.double) -> cython.void:
+def add_hold_impulses(w: cython.pointer(Step), i: cython.Py_ssize_t, share: cython.double) -> cython.void:
     """Record `share` of the impulses of surfaces on linked particle i: before (-1) and after (1) links change it."""
     k: cython.pointer(Links) = w.link_table
     c: cython.Py_ssize_t
     if k.own[i] == 0 or not k.surfaces:
         return
-    for c in range(w.contact_begin[k.slot[i]], w.contact_end[k.slot[i]]):
+    for c in range(w.contact_begin[k.sorted_index[i]], w.contact_end[k.sorted_index[i]]):
         first: cython.Py_ssize_t = CONTACT * c
-        jn: cython.double = share * w.weigh * w.contact[first + PUSH]
-        jt: cython.double = share * w.weigh * w.contact[first + DRAG]
+        jn: cython.double = share * w.rest_scale * w.contact[first + PUSH]
+        jt: cython.double = share * w.rest_scale * w.contact[first + DRAG]
         nx: cython.double = w.contact[first + NORMAL]
         ny: cython.double = w.contact[first + NORMAL + 1]
-        note_surface(w, k.slot[i], c, jn, jt, nx, ny, False)
+        add_surface_impulse(w, k.sorted_index[i], c, jn, jt, nx, ny, False)
         if w.surface[c] < 0:
             keep_with_pair(w, c)

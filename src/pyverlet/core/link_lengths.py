@@ -32,7 +32,7 @@ STIRRED = cython.declare(cython.double, 0.5)
 """Largest gain of energy of a chain, in terms of its internal motion: with more, lengths are right but the solution is not, since
 links do no work."""
 
-NO_ROOM = cython.declare(cython.double, 0.1)
+NO_SPACE = cython.declare(cython.double, 0.1)
 """Relative length error from which there is no room between the surfaces that hold a chain; they then release it."""
 
 LINK_SWEEPS = cython.declare(cython.int, 10)
@@ -108,7 +108,7 @@ def chain_motion(
 
 
 @inlined
-def is_calm(
+def is_settled(
     k: cython.pointer(Links), first: cython.Py_ssize_t, end: cython.Py_ssize_t, seen: LinkWay, before: ChainMotion
 ) -> cython.bint:  # fmt: skip
     """Whether a solved chain has gained no more energy than links that do no work allow."""
@@ -167,11 +167,13 @@ def let_go_of_surfaces(k: cython.pointer(Links), first: cython.Py_ssize_t, end: 
 
 
 @kernel
-def let_rub(k: cython.pointer(Links), first: cython.Py_ssize_t, end: cython.Py_ssize_t, rubs: cython.bint) -> cython.void:
+def set_friction(
+    k: cython.pointer(Links), first: cython.Py_ssize_t, end: cython.Py_ssize_t, has_friction: cython.bint
+) -> cython.void:
     """Set whether surfaces have friction on the particles of a chain."""
-    k.rubs[k.node[k.first[first]]] = rubs
+    k.has_friction[k.node[k.first[first]]] = has_friction
     for r in range(first, end):
-        k.rubs[k.node[k.first[r] + 1]] = rubs
+        k.has_friction[k.node[k.first[r] + 1]] = has_friction
 
 
 @kernel
@@ -244,7 +246,7 @@ def pass_through(w: cython.pointer(Step), first: cython.Py_ssize_t, end: cython.
     """
     k: cython.pointer(Links) = w.link_table
     tries: cython.int = 0
-    if misses(k, first, end) < NO_ROOM:
+    if misses(k, first, end) < NO_SPACE:
         return
     start_anew(w, first, end)
     let_go_of_surfaces(k, first, end)
@@ -268,10 +270,10 @@ def step_in_net(w: cython.pointer(Step), first: cython.Py_ssize_t, end: cython.P
     hold_chain(w, first, end)
     if not misses(k, first, end) < most and k.rough and k.surfaces:
         restore_chain(w, first, end)
-        let_rub(k, first, end, False)
+        set_friction(k, first, end, False)
         step_chain(k, first, end, True, CHORDS, 1)
         hold_chain(w, first, end)
-        let_rub(k, first, end, True)
+        set_friction(k, first, end, True)
     if not misses(k, first, end) < most:
         sweep_chain(w, first, end)
     if held:
@@ -289,7 +291,7 @@ def relax_chain(w: cython.pointer(Step), first: cython.Py_ssize_t, end: cython.P
     seen: LinkWay = seen_from(k, first, end)
     before: ChainMotion = chain_motion(k, first, end, seen, k.least)
     step_chain(k, first, end, False, CHORDS, 1)
-    if is_calm(k, first, end, seen, before):
+    if is_settled(k, first, end, seen, before):
         return
     for r in range(first, end):
         if k.acts[r]:
@@ -315,19 +317,19 @@ def solve_chain(w: cython.pointer(Step), first: cython.Py_ssize_t, end: cython.P
     held: cython.bint = is_held(k, first, end)
     seen: LinkWay = seen_from(k, first, end)
     before: ChainMotion = chain_motion(k, first, end, seen, k.least)
-    if approach(w, first, end, LENGTH_SOLVED, WAVES) <= LENGTH_SOLVED and is_calm(k, first, end, seen, before):
+    if approach(w, first, end, LENGTH_SOLVED, WAVES) <= LENGTH_SOLVED and is_settled(k, first, end, seen, before):
         return
     if k.rough and k.surfaces:
         restore_chain(w, first, end)
-        let_rub(k, first, end, False)
+        set_friction(k, first, end, False)
         approach(w, first, end, LENGTH_SOLVED, WAVES)
-    if not (misses(k, first, end) < LOST and is_calm(k, first, end, seen, before)):
+    if not (misses(k, first, end) < LOST and is_settled(k, first, end, seen, before)):
         start_anew(w, first, end)
-        if not (approach(w, first, end, NEAR_ENOUGH, LOST_WAY) < LOST and is_calm(k, first, end, seen, before)):
+        if not (approach(w, first, end, NEAR_ENOUGH, LOST_WAY) < LOST and is_settled(k, first, end, seen, before)):
             sweep_chain(w, first, end)
             swept: cython.double = misses(k, first, end)
             if swept > NEAR_ENOUGH and not approach(w, first, end, NEAR_ENOUGH, LOST_WAY) < swept:
                 sweep_chain(w, first, end)
         if held:
             pass_through(w, first, end)
-    let_rub(k, first, end, True)
+    set_friction(k, first, end, True)

@@ -24,7 +24,7 @@ from pyverlet.core.work import BY_MOTORS, WORK
 def spin_mobility(w: cython.pointer(Step), i: cython.Py_ssize_t) -> cython.double:
     """1 / I of linked particle i, 1/(kg m^2)."""
     k: cython.pointer(Links) = w.link_table
-    r: cython.double = w.radius[k.slot[i]]
+    r: cython.double = w.radius[k.sorted_index[i]]
     return k.own[i] * k.ease[i] / (r * r)
 
 
@@ -40,7 +40,7 @@ def give_turn(
     if k.own[i] > 0:
         turned: cython.double = change * spin_mobility(w, i)
         k.spun[i] -= turned
-        k.rim[i] -= turned * w.radius[k.slot[i]]
+        k.rim[i] -= turned * w.radius[k.sorted_index[i]]
     for e in range(k.first[r], k.first[r + 1]):
         push(k, k.node[e], change * along[2 * e], change * along[2 * e + 1])
 
@@ -63,7 +63,7 @@ def turn_motor(w: cython.pointer(Step), r: cython.Py_ssize_t, along: cython.poin
     i: cython.Py_ssize_t = k.node[k.first[r]]
     e: cython.Py_ssize_t
     free: cython.double = spin_mobility(w, i)
-    rate: cython.double = -k.rim[i] / w.radius[k.slot[i]]
+    rate: cython.double = -k.rim[i] / w.radius[k.sorted_index[i]]
     most: cython.double = k.upper[r] * k.kick
     if k.intact[r] == 0:
         return
@@ -78,18 +78,18 @@ def turn_motor(w: cython.pointer(Step), r: cython.Py_ssize_t, along: cython.poin
 
 
 @kernel
-def book_motors(w: cython.pointer(Step)) -> cython.void:
+def add_motor_work(w: cython.pointer(Step)) -> cython.void:
     """Book the work of motors in this substep, J dA/dt - J s with means of before and after, as in `core.work`."""
     k: cython.pointer(Links) = w.link_table
     e: cython.Py_ssize_t
     axis: cython.int
     for r in range(k.rows):
         if k.kind[r] == MOTOR and k.impulse[r] != 0:
-            i: cython.Py_ssize_t = k.slot[k.node[k.first[r]]]
+            i: cython.Py_ssize_t = k.sorted_index[k.node[k.first[r]]]
             rate: cython.double = -0.5 * (cython.cast(cython.double, w.free_spin[i]) + w.motion[4 * i + 2])
             for e in range(k.first[r], k.first[r + 1]):
                 for axis in range(2):
-                    at: cython.Py_ssize_t = k.slot[k.node[e]]
+                    at: cython.Py_ssize_t = k.sorted_index[k.node[e]]
                     before: cython.double = w.free[2 * at + axis]
                     after: cython.double = w.motion[4 * at + axis] - w.acceleration[2 * at + axis] * w.h
                     rate += k.gradient[2 * e + axis] * 0.5 * (before + after)
@@ -97,12 +97,12 @@ def book_motors(w: cython.pointer(Step)) -> cython.void:
 
 
 @kernel
-def note_spun(w: cython.pointer(Step)) -> cython.void:
+def keep_motor_spin(w: cython.pointer(Step)) -> cython.void:
     """Count spins by motors as free motion for contacts: they are not impacts, which are limited."""
     k: cython.pointer(Links) = w.link_table
     for i in range(k.count):
         if k.powered[i] > 0:
-            w.free_spin[k.slot[i]] += cython.cast(real, k.spun[i])
+            w.free_spin[k.sorted_index[i]] += cython.cast(real, k.spun[i])
 
 
 @cython.cfunc
@@ -117,11 +117,11 @@ def work_of_last_motors(w: cython.pointer(Step), share: cython.double) -> cython
         return 0.0
     for r in range(k.rows):
         if k.kind[r] == MOTOR:
-            i: cython.Py_ssize_t = k.slot[k.node[k.first[r]]]
+            i: cython.Py_ssize_t = k.sorted_index[k.node[k.first[r]]]
             rate: cython.double = half * w.given_spin[i] - w.spin[i]
             for e in range(k.first[r], k.first[r + 1]):
                 for axis in range(2):
-                    at: cython.Py_ssize_t = 2 * cython.cast(cython.Py_ssize_t, k.slot[k.node[e]]) + axis
+                    at: cython.Py_ssize_t = 2 * cython.cast(cython.Py_ssize_t, k.sorted_index[k.node[e]]) + axis
                     rate += k.slope[2 * e + axis] * (w.velocity[at] - half * w.given[at])
             total += share * k.impulse[r] * rate
     return total

@@ -21,18 +21,18 @@ COOL = cython.declare(cython.double, 10)
 
 
 @kernel
-def lend(k: cython.pointer(Links), i: cython.Py_ssize_t, x: cython.double, y: cython.double) -> cython.void:
+def add_warm(k: cython.pointer(Links), i: cython.Py_ssize_t, x: cython.double, y: cython.double) -> cython.void:
     """Mark this impulse on linked particle i for removal before rows are solved."""
     if k.own[i] > 0:
-        k.loaned[2 * i] += k.weight[i] * x
-        k.loaned[2 * i + 1] += k.weight[i] * y
+        k.warmed[2 * i] += k.weight[i] * x
+        k.warmed[2 * i + 1] += k.weight[i] * y
 
 
 @kernel
-def lend_between(k: cython.pointer(Links), r: cython.Py_ssize_t, x: cython.double, y: cython.double) -> cython.void:
+def add_warm_between(k: cython.pointer(Links), r: cython.Py_ssize_t, x: cython.double, y: cython.double) -> cython.void:
     """Mark this impulse between the ends of row r, given for the second end, for removal."""
-    lend(k, k.node[k.first[r]], -x, -y)
-    lend(k, k.node[k.first[r] + 1], x, y)
+    add_warm(k, k.node[k.first[r]], -x, -y)
+    add_warm(k, k.node[k.first[r] + 1], x, y)
 
 
 @kernel
@@ -57,7 +57,7 @@ def warm_block(w: cython.pointer(Step), b: cython.Py_ssize_t) -> cython.void:
         k.load[r] = k.impulse[r]
         moves: cython.double = k.h * mobility(k, r)
         k.keeps[r] = k.soft[r] / (k.soft[r] + moves) if k.soft[r] < INFINITY and k.soft[r] + moves > 0 else 1
-        lent: cython.double = 1 - k.keeps[r]
+        extra: cython.double = 1 - k.keeps[r]
         if k.kind[r] == DISTANCE:
             x: cython.double = k.way[2 * r]
             y: cython.double = k.way[2 * r + 1]
@@ -71,15 +71,15 @@ def warm_block(w: cython.pointer(Step), b: cython.Py_ssize_t) -> cython.void:
                 x *= scale
                 y *= scale
                 give(k, r, x, y)
-                lend_between(k, r, lent * x, lent * y)
+                add_warm_between(k, r, extra * x, extra * y)
         else:
             push_row(k, r, k.impulse[r], k.gradient)
             for e in range(k.first[r], k.first[r + 1]):
-                lend(k, k.node[e], lent * k.impulse[r] * k.gradient[2 * e], lent * k.impulse[r] * k.gradient[2 * e + 1])
+                add_warm(k, k.node[e], extra * k.impulse[r] * k.gradient[2 * e], extra * k.impulse[r] * k.gradient[2 * e + 1])
 
 
 @kernel
-def temper(w: cython.pointer(Step), i: cython.Py_ssize_t) -> cython.void:
+def limit_warm(w: cython.pointer(Step), i: cython.Py_ssize_t) -> cython.void:
     """Reduce the warm start of linked particle i if it becomes much faster than before, contacts included.
 
     A light particle at the kink of a loaded chain gets two large impulses that no longer cancel, and would be shot at what it
@@ -87,21 +87,21 @@ def temper(w: cython.pointer(Step), i: cython.Py_ssize_t) -> cython.void:
     """
     k: cython.pointer(Links) = w.link_table
     axis: cython.int
-    x: cython.double = k.loaned[2 * i]
-    y: cython.double = k.loaned[2 * i + 1]
-    lent: cython.double = x * x + y * y
+    x: cython.double = k.warmed[2 * i]
+    y: cython.double = k.warmed[2 * i + 1]
+    extra: cython.double = x * x + y * y
     before: cython.double = sqrt(k.begun[3 * i] * k.begun[3 * i] + k.begun[3 * i + 1] * k.begun[3 * i + 1])
     most: cython.double = HEATED * before + COOL * k.least
     square: cython.double = k.u[2 * i] * k.u[2 * i] + k.u[2 * i + 1] * k.u[2 * i + 1]
-    if k.own[i] == 0 or square <= most * most or lent == 0:
+    if k.own[i] == 0 or square <= most * most or extra == 0:
         return
-    # Choose t so that |u - t lent| equals `most`, or is as small as possible.
-    along: cython.double = (k.u[2 * i] * x + k.u[2 * i + 1] * y) / lent
-    rest: cython.double = along * along - (square - most * most) / lent
+    # Choose t so that |u - t warmed| equals `most`, or is as small as possible.
+    along: cython.double = (k.u[2 * i] * x + k.u[2 * i + 1] * y) / extra
+    rest: cython.double = along * along - (square - most * most) / extra
     t: cython.double = min(max(along - sqrt(max(rest, 0.0)), 0.0), 1.0)
-    at: cython.Py_ssize_t = 2 * cython.cast(cython.Py_ssize_t, k.slot[i])
+    at: cython.Py_ssize_t = 2 * cython.cast(cython.Py_ssize_t, k.sorted_index[i])
     for axis in range(2):
-        excess: cython.double = t * k.loaned[2 * i + axis]
-        k.loaned[2 * i + axis] -= excess
+        excess: cython.double = t * k.warmed[2 * i + axis]
+        k.warmed[2 * i + axis] -= excess
         k.u[2 * i + axis] -= excess
         w.acceleration[at + axis] -= cython.cast(real, excess / k.kick)

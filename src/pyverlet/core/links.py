@@ -16,11 +16,11 @@ from cython.cimports.team import team_function, team_stage
 from pyverlet.core.cells import BLOCK
 from pyverlet.core.kernels import inlined, kernel
 from pyverlet.core.link_arrays import Links
-from pyverlet.core.link_blocks import AVERAGED, begin_block, end_row, finish_row, solve_block, take_back_row
-from pyverlet.core.link_holds import find_hold, move, note_holds
+from pyverlet.core.link_blocks import AVERAGED, begin_block, end_row, finish_row, solve_block, undo_row
+from pyverlet.core.link_holds import add_hold_impulses, find_hold, move
 from pyverlet.core.link_pins import begin_pin, end_pin, finish_pin, finish_rigid_pin, hold_pin, hold_rigid_pin
-from pyverlet.core.link_warm_start import temper, warm_block
-from pyverlet.core.rebounds import BLOW
+from pyverlet.core.link_warm_start import limit_warm, warm_block
+from pyverlet.core.rebounds import IMPACT
 from pyverlet.core.step import Step
 
 PUT_OUT = cython.declare(cython.double, 4)
@@ -36,7 +36,7 @@ def take_stage(what: cython.p_void, block: cython.int) -> cython.void:
     width: cython.Py_ssize_t = 4 if w.rough else 2
     a: cython.Py_ssize_t = block * BLOCK
     for i in range(a, min(a + BLOCK, k.count)):
-        at: cython.Py_ssize_t = k.slot[i]
+        at: cython.Py_ssize_t = k.sorted_index[i]
         k.u[2 * i], k.u[2 * i + 1] = v[width * at], v[width * at + 1]
         if w.rough:
             k.ease[i] = w.ease[w.mixed * at]
@@ -52,7 +52,7 @@ def put_stage(what: cython.p_void, block: cython.int) -> cython.void:
     width: cython.Py_ssize_t = 4 if w.rough else 2
     a: cython.Py_ssize_t = block * BLOCK
     for i in range(a, min(a + BLOCK, k.count)):
-        at: cython.Py_ssize_t = k.slot[i]
+        at: cython.Py_ssize_t = k.sorted_index[i]
         if k.own[i] > 0:
             v[width * at], v[width * at + 1] = cython.cast(real, k.u[2 * i]), cython.cast(real, k.u[2 * i + 1])
             if w.rough and (k.powered[i] > 0 or (k.surfaces and w.contact_begin[at] < w.contact_end[at])):
@@ -66,7 +66,7 @@ def put_held_stage(what: cython.p_void, block: cython.int) -> cython.void:
     k: cython.pointer(Links) = w.link_table
     a: cython.Py_ssize_t = block * BLOCK
     for i in range(a, min(a + BLOCK, k.count)):
-        note_holds(w, i, 1)
+        add_hold_impulses(w, i, 1)
     put_stage(what, block)
 
 
@@ -78,12 +78,12 @@ def take_held_stage(what: cython.p_void, block: cython.int) -> cython.void:
     a: cython.Py_ssize_t = block * BLOCK
     take_stage(what, block)
     for i in range(a, min(a + BLOCK, k.count)):
-        at: cython.Py_ssize_t = k.slot[i]
+        at: cython.Py_ssize_t = k.sorted_index[i]
         if not k.drifted and w.since[at] > 0:  # an impact has moved the start of its path
             k.x[2 * i], k.x[2 * i + 1] = w.position[2 * at], w.position[2 * at + 1]
         find_hold(w, i)
-        if w.noting:
-            note_holds(w, i, -1)
+        if w.records_contacts:
+            add_hold_impulses(w, i, -1)
 
 
 @kernel
@@ -94,19 +94,19 @@ def open_stage(what: cython.p_void, block: cython.int) -> cython.void:
     a: cython.Py_ssize_t = block * BLOCK
     take_stage(what, block)
     for i in range(a, min(a + BLOCK, k.count)):
-        at: cython.Py_ssize_t = k.slot[i]
+        at: cython.Py_ssize_t = k.sorted_index[i]
         k.x[2 * i], k.x[2 * i + 1] = w.position[2 * at], w.position[2 * at + 1]
         k.own[i] = k.weight[i] = w.inverse_mass[at]
         k.react[2 * i] = k.react[2 * i + 1] = 0
-        k.loaned[2 * i] = k.loaned[2 * i + 1] = k.spun[i] = 0
+        k.warmed[2 * i] = k.warmed[2 * i + 1] = k.spun[i] = 0
         k.begun[3 * i], k.begun[3 * i + 1] = k.u[2 * i], k.u[2 * i + 1]
         k.held[i] = -1
         w.node[at] = cython.cast(int32_t, i)
-        w.blow[BLOW * at] = w.blow[BLOW * at + 1] = 0
+        w.impact[IMPACT * at] = w.impact[IMPACT * at + 1] = 0
 
 
 @kernel
-def take_back_stage(what: cython.p_void, block: cython.int) -> cython.void:
+def undo_stage(what: cython.p_void, block: cython.int) -> cython.void:
     """Remove the warm start from velocities of a block before rows are solved."""
     w: cython.pointer(Step) = cython.cast(cython.pointer(Step), what)
     k: cython.pointer(Links) = w.link_table
@@ -114,19 +114,21 @@ def take_back_stage(what: cython.p_void, block: cython.int) -> cython.void:
     axis: cython.int
     take_held_stage(what, block)
     for i in range(a, min(a + BLOCK, k.count)):
-        move(k, i, -k.loaned[2 * i], -k.loaned[2 * i + 1])
+        move(k, i, -k.warmed[2 * i], -k.warmed[2 * i + 1])
         for axis in range(2):
             if k.own[i] > 0:
-                w.acceleration[2 * cython.cast(cython.Py_ssize_t, k.slot[i]) + axis] = cython.cast(real, k.driven[2 * i + axis])
+                w.acceleration[2 * cython.cast(cython.Py_ssize_t, k.sorted_index[i]) + axis] = cython.cast(
+                    real, k.driven[2 * i + axis]
+                )
 
 
 @kernel
-def take_back_chunk(what: cython.p_void, item: cython.int) -> cython.void:
+def undo_chunk(what: cython.p_void, item: cython.int) -> cython.void:
     """Remove the warm start from the rows of a chunk."""
     k: cython.pointer(Links) = cython.cast(cython.pointer(Step), what).link_table
     r: cython.Py_ssize_t
     for r in range(k.block[k.chunk[item]], k.block[k.chunk[item + 1]]):
-        take_back_row(k, r)
+        undo_row(k, r)
 
 
 @kernel
@@ -137,7 +139,7 @@ def warmed_stage(what: cython.p_void, block: cython.int) -> cython.void:
     k: cython.pointer(Links) = w.link_table
     a: cython.Py_ssize_t = block * BLOCK
     for i in range(a, min(a + BLOCK, k.count)):
-        at: cython.Py_ssize_t = 2 * cython.cast(cython.Py_ssize_t, k.slot[i])
+        at: cython.Py_ssize_t = 2 * cython.cast(cython.Py_ssize_t, k.sorted_index[i])
         for axis in range(2 if k.own[i] > 0 else 0):
             given: cython.double = cython.cast(real, k.u[2 * i + axis]) - w.free[at + axis]
             k.driven[2 * i + axis] = w.acceleration[at + axis]
@@ -147,14 +149,14 @@ def warmed_stage(what: cython.p_void, block: cython.int) -> cython.void:
 
 
 @kernel
-def temper_stage(what: cython.p_void, block: cython.int) -> cython.void:
+def limit_warm_stage(what: cython.p_void, block: cython.int) -> cython.void:
     """Limit the warm start of a block, contacts included."""
     w: cython.pointer(Step) = cython.cast(cython.pointer(Step), what)
     k: cython.pointer(Links) = w.link_table
     a: cython.Py_ssize_t = block * BLOCK
     take_stage(what, block)
     for i in range(a, min(a + BLOCK, k.count)):
-        temper(w, i)
+        limit_warm(w, i)
     put_stage(what, block)
 
 
@@ -165,7 +167,7 @@ def remember_motors_stage(what: cython.p_void, block: cython.int) -> cython.void
     k: cython.pointer(Links) = w.link_table
     a: cython.Py_ssize_t = block * BLOCK
     for i in range(a, min(a + BLOCK, k.count)):
-        at: cython.Py_ssize_t = k.slot[i]
+        at: cython.Py_ssize_t = k.sorted_index[i]
         if k.own[i] > 0:
             w.given_spin[at] += cython.cast(real, k.spun[i])
 
@@ -252,7 +254,7 @@ def begin_links(w: cython.pointer(Step), surfaces: cython.bint) -> cython.void:
     opens: cython.bint = w.substep == w.first
     k.h = cython.cast(cython.double, w.h)
     k.left = k.substeps - w.substep
-    k.kick = cython.cast(cython.double, w.h / w.weigh if opens and w.weigh > 0 else w.h)
+    k.kick = cython.cast(cython.double, w.h / w.rest_scale if opens and w.rest_scale > 0 else w.h)
     k.scale = cython.cast(cython.double, w.scale if opens else 1)
     k.spring_h = max(cython.cast(cython.double, w.spring_h), k.h)
     k.least = cython.cast(cython.double, w.rest_speed)
@@ -270,9 +272,9 @@ def begin_links(w: cython.pointer(Step), surfaces: cython.bint) -> cython.void:
 
 
 @kernel
-def temper_links(w: cython.pointer(Step)) -> cython.void:
+def limit_warm_links(w: cython.pointer(Step)) -> cython.void:
     """After the warm start of links and contacts: limit it."""
-    team_stage(w.team, temper_stage, w, blocks_of(w.link_table))
+    team_stage(w.team, limit_warm_stage, w, blocks_of(w.link_table))
 
 
 @kernel
@@ -284,8 +286,8 @@ def solve_links(w: cython.pointer(Step), again: cython.bint, last: cython.bint) 
     if again:
         team_stage(w.team, take_held_stage, w, blocks_of(k))
     else:
-        team_stage(w.team, take_back_stage, w, blocks_of(k))
-        team_stage(w.team, take_back_chunk, w, cython.cast(cython.int, k.colour[k.colours]))
+        team_stage(w.team, undo_stage, w, blocks_of(k))
+        team_stage(w.team, undo_chunk, w, cython.cast(cython.int, k.colour[k.colours]))
     k.warm = False
     for p in range(k.pins):
         hold_pin(k, p)

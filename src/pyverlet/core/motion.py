@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 from pyverlet.core.energy_limiting import raise_of
-from pyverlet.core.energy_taking import take_energy
+from pyverlet.core.energy_removal import remove_energy
 from pyverlet.core.fluid import energy_of_fluid, flow_of_fluid
 from pyverlet.core.forces import add_drag, add_values, attract, function_arguments, soften, thermalize
 from pyverlet.core.function_calls import add_compiled, compiled_values
@@ -42,9 +42,9 @@ __all__ = [
     "newton",
     "next_velocity",
     "raise_of",
+    "remove_energy",
     "settle",
     "soften",
-    "take_energy",
     "thermalize",
     "time_at_rest",
 ]

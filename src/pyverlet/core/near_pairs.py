@@ -30,10 +30,10 @@ def moved_beyond(position, before, limit: cython.double, period_x: cython.double
 
 
 def measure_near(
-    position, first, second, reach: cython.double, period_x: cython.double, period_y: cython.double, together: cython.bint,
+    position, first, second, cutoff: cython.double, period_x: cython.double, period_y: cython.double, together: cython.bint,
     near, distance, way,
 ):  # fmt: skip
-    """Select the listed pairs closer than `reach`; returns their number. Coincident pairs have no direction: they are left out,
+    """Select the listed pairs closer than `cutoff`; returns their number. Coincident pairs have no direction: they are left out,
     or (`together`) get that of x.
 
     near (2, k) int32: first and second of each; distance (k,) m; way (k, 2): the unit vector from first to second.
@@ -45,7 +45,7 @@ def measure_near(
     far: cython.pointer(cython.double) = doubles(distance)
     unit: cython.pointer(cython.double) = doubles(way)
     count: int64_t = len(first)
-    room: int64_t = len(distance)
+    capacity: int64_t = len(distance)
     found: int64_t = 0
     with cython.nogil:
         for k in range(count):
@@ -54,10 +54,10 @@ def measure_near(
             dx: cython.double = nearest_in_double(cython.cast(cython.double, x[2 * j]) - x[2 * i], period_x)
             dy: cython.double = nearest_in_double(cython.cast(cython.double, x[2 * j + 1]) - x[2 * i + 1], period_y)
             square: cython.double = dx * dx + dy * dy
-            if square < reach * reach and (square > 0 or together):
+            if square < cutoff * cutoff and (square > 0 or together):
                 size: cython.double = sqrt(square)
                 out[found] = cython.cast(int32_t, i)
-                out[room + found] = cython.cast(int32_t, j)
+                out[capacity + found] = cython.cast(int32_t, j)
                 far[found] = size
                 unit[2 * found] = dx / size if size > 0 else 1.0
                 unit[2 * found + 1] = dy / size if size > 0 else 0.0

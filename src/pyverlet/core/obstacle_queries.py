@@ -75,7 +75,7 @@ def list_segments(segments, reach: cython.double, cell: cython.double, heads, li
     link: cython.pointer(int32_t) = small_integers(links)
     count: cython.Py_ssize_t = len(segments)
     table: int64_t = len(heads)
-    room: cython.Py_ssize_t = len(links)
+    capacity: cython.Py_ssize_t = len(links)
     used: cython.Py_ssize_t = 0
     with cython.nogil:
         for k in range(table):
@@ -86,7 +86,7 @@ def list_segments(segments, reach: cython.double, cell: cython.double, heads, li
             dy: cython.double = s[at + SINE] * s[at + LENGTH]
             far: cython.double = reach + s[at + ROUNDING] + s[at + INNER]
             if used >= 0:
-                used = list_line(k, s[at + X], s[at + Y], dx, dy, far, cell, head, table, link, room, used)
+                used = list_line(k, s[at + X], s[at + Y], dx, dy, far, cell, head, table, link, capacity, used)
     return used
 
 
@@ -144,7 +144,7 @@ def segments_near(
     to_gap: cython.pointer(cython.double) = doubles(gap)
     to_normal: cython.pointer(cython.double) = doubles(normal)
     to_inside: cython.pointer(int64_t) = integers(inside)
-    room: cython.Py_ssize_t = len(row)
+    capacity: cython.Py_ssize_t = len(row)
     count: cython.Py_ssize_t = len(position)
     all_count: cython.bint = len(wanted) == 0
     found: cython.Py_ssize_t = 0
@@ -172,7 +172,7 @@ def segments_near(
                 if not (within or away <= most[i]):
                     continue
                 n: cython.Py_ssize_t = found if all_count else begun
-                if n < room and (n == found or away < to_gap[n]):
+                if n < capacity and (n == found or away < to_gap[n]):
                     to_row[n], to_segment[n], to_inside[n], to_gap[n] = i, k, within, away
                     to_normal[2 * n], to_normal[2 * n + 1] = ox / max(far, 1e-300), oy / max(far, 1e-300)
                 found = n + 1
@@ -237,9 +237,9 @@ def to_wall(w: cython.pointer[cython.const[cython.double]], k: cython.int, r: cy
         return gap / closing if closing > 0.0 and gap < INFINITY else INFINITY
     ox: cython.double = r.x - w[0]
     oy: cython.double = r.y - w[1]
-    room: cython.double = w[2] - r.size
-    left: cython.double = room * room - ox * ox - oy * oy
-    if room <= 0.0 or left <= 0.0:
+    inside: cython.double = w[2] - r.size
+    left: cython.double = inside * inside - ox * ox - oy * oy
+    if inside <= 0.0 or left <= 0.0:
         return 0.0
     away: cython.double = ox * r.dx + oy * r.dy
     root: cython.double = sqrt(away * away + left)

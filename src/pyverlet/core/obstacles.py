@@ -87,7 +87,7 @@ def list_segment(w: cython.pointer(Step), k: cython.Py_ssize_t, dt: cython.doubl
         far += w.segment[at + INNER]
     if not fabs(x) + fabs(y) + w.segment[at + LENGTH] + far < FARTHEST_LISTED * w.cell:
         return False
-    used: cython.Py_ssize_t = list_line(k, x, y, dx, dy, far, w.cell, w.head, w.cell_heads, w.link, w.links_room, w.links)
+    used: cython.Py_ssize_t = list_line(k, x, y, dx, dy, far, w.cell, w.head, w.cell_heads, w.link, w.links_capacity, w.links)
     if used < 0:
         return False
     w.links = used

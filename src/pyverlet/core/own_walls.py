@@ -36,7 +36,7 @@ Walled = cython.struct(
 
 
 @kernel
-def meet_wall(w: cython.pointer(Walled), i: cython.Py_ssize_t, nx: real, ny: real, depth: real) -> cython.void:
+def collide_with_wall(w: cython.pointer(Walled), i: cython.Py_ssize_t, nx: real, ny: real, depth: real) -> cython.void:
     """Put back particle i, which is `depth` > 0 beyond a wall of normal (nx, ny) into the room.
 
     The larger restitution of particle and wall is used, and the geometric mean of the frictions.
@@ -73,12 +73,12 @@ def meet_wall(w: cython.pointer(Walled), i: cython.Py_ssize_t, nx: real, ny: rea
         # Along (ny, -nx), counter-clockwise around the room; the contact point of a disc has the inverse mass 3 / m.
         slip: real = w.v[2 * i] * ny - w.v[2 * i + 1] * nx + w.spin[i] * w.radius[i] - w.belt
         most: real = mu * (after - before)
-        rub: real = max(min(-slip / three, most), -most)
-        w.v[2 * i] += rub * ny
-        w.v[2 * i + 1] -= rub * nx
-        w.x[2 * i] += time * rub * ny
-        w.x[2 * i + 1] -= time * rub * nx
-        w.spin[i] += two * rub / w.radius[i]
+        tangent: real = max(min(-slip / three, most), -most)
+        w.v[2 * i] += tangent * ny
+        w.v[2 * i + 1] -= tangent * nx
+        w.x[2 * i] += time * tangent * ny
+        w.x[2 * i + 1] -= time * tangent * nx
+        w.spin[i] += two * tangent / w.radius[i]
 
 
 @cython.cfunc
@@ -103,13 +103,13 @@ def confine_to_box(x0: real, y0: real, x1: real, y1: real, bodies, inverse_mass,
         for i in range(count):
             if free[i] > zero:
                 if w.x[2 * i] - w.radius[i] < x0:
-                    meet_wall(w, i, one, zero, x0 + w.radius[i] - w.x[2 * i])
+                    collide_with_wall(w, i, one, zero, x0 + w.radius[i] - w.x[2 * i])
                 if w.x[2 * i] + w.radius[i] > x1:
-                    meet_wall(w, i, -one, zero, w.x[2 * i] + w.radius[i] - x1)
+                    collide_with_wall(w, i, -one, zero, w.x[2 * i] + w.radius[i] - x1)
                 if w.x[2 * i + 1] - w.radius[i] < y0:
-                    meet_wall(w, i, zero, one, y0 + w.radius[i] - w.x[2 * i + 1])
+                    collide_with_wall(w, i, zero, one, y0 + w.radius[i] - w.x[2 * i + 1])
                 if w.x[2 * i + 1] + w.radius[i] > y1:
-                    meet_wall(w, i, zero, -one, w.x[2 * i + 1] + w.radius[i] - y1)
+                    collide_with_wall(w, i, zero, -one, w.x[2 * i + 1] + w.radius[i] - y1)
 
 
 def confine_to_circle(x0: real, y0: real, size: real, bodies, inverse_mass, hits, law):
@@ -124,7 +124,7 @@ def confine_to_circle(x0: real, y0: real, size: real, bodies, inverse_mass, hits
         for i in range(count):
             dx: real = x0 - w.x[2 * i]
             dy: real = y0 - w.x[2 * i + 1]
-            room: real = max(size - w.radius[i], zero)
+            inside: real = max(size - w.radius[i], zero)
             distance: real = cython.cast(real, sqrt(dx * dx + dy * dy))
-            if distance > room and free[i] > zero:
-                meet_wall(w, i, dx / distance, dy / distance, distance - room)
+            if distance > inside and free[i] > zero:
+                collide_with_wall(w, i, dx / distance, dy / distance, distance - inside)

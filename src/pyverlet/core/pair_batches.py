@@ -75,7 +75,7 @@ def put_pair(ls: cython.pointer(Lists), c: cython.pointer(Cells), k: int64_t, a:
 
 @kernel
 def put_rest(
-    ls: cython.pointer(Lists), c: cython.pointer(Cells), low: int64_t, end: int64_t, k: int64_t, room: int64_t, phase: int64_t
+    ls: cython.pointer(Lists), c: cython.pointer(Cells), low: int64_t, end: int64_t, k: int64_t, capacity: int64_t, phase: int64_t
 ) -> int64_t:
     """Fill batches from lane k on with the pairs rest[low] to rest[end]; returns the end of lanes, even beyond the room.
 
@@ -95,7 +95,7 @@ def put_rest(
             b: uint32_t = ls.raw_j[pair] & PLACE_BITS
             if ls.batch[a] != number and ls.batch[b] != number:
                 ls.batch[a] = ls.batch[b] = number
-                if k + taken < room:
+                if k + taken < capacity:
                     put_pair(ls, c, k + taken, a, b)
                 taken += 1
             else:
@@ -105,7 +105,7 @@ def put_rest(
         low = p - waits
         for lane in range(waits):
             ls.rest[low + lane] = waiting[lane]
-        for lane in range(k + taken, min(k + 8, room)):
+        for lane in range(k + taken, min(k + 8, capacity)):
             ls.put_i[lane], ls.put_j[lane] = ls.put_i[lane - 1], ls.put_j[lane - 1]
             ls.put_x[lane], ls.put_y[lane] = ls.put_x[lane - 1], ls.put_y[lane - 1]
         k += 8
@@ -115,7 +115,7 @@ def put_rest(
 @kernel
 def put_batches(
     w: cython.pointer(Step), ls: cython.pointer(Lists), c: cython.pointer(Cells), s: cython.Py_ssize_t, alone: cython.bint,
-    low: int64_t, end: int64_t, room: int64_t,
+    low: int64_t, end: int64_t, capacity: int64_t,
 ) -> int64_t:  # fmt: skip
     """Arrange the pairs `low` to `end` of the scratch memory in lanes from `low` on; returns their end, even beyond the room."""
     first: int64_t[34]
@@ -129,7 +129,7 @@ def put_batches(
         a: uint32_t = ls.raw_i[p]
         b: uint32_t = ls.raw_j[p] & PLACE_BITS
         colour: cython.int = NO_COLOUR
-        pinned: cython.bint = ls.picky and (w.inverse_mass[c.order[a]] == 0 or w.inverse_mass[c.order[b]] == 0)
+        pinned: cython.bint = ls.tests_pairs and (w.inverse_mass[c.order[a]] == 0 or w.inverse_mass[c.order[b]] == 0)
         if not alone and not pinned:
             # Bit NO_COLOUR is always free.
             free: uint32_t = (MOST_COLOURS & ~(ls.used[a] | ls.used[b])) | LAST_COLOUR
@@ -156,7 +156,7 @@ def put_batches(
             whole = begin + (first[key] - begin) // 8 * 8
         for p in range(begin, whole):
             pair: uint32_t = ls.sorted[p]
-            if k < room:
+            if k < capacity:
                 put_pair(ls, c, k, ls.raw_i[pair], ls.raw_j[pair] & PLACE_BITS)
             k += 1
         for p in range(whole, first[key]):
@@ -164,12 +164,12 @@ def put_batches(
             left += 1
         begin = first[key]
         if key % COLOURS == NO_COLOUR:
-            k = put_rest(ls, c, low, left, k, room, 2 if alone else s % 2)
+            k = put_rest(ls, c, low, left, k, capacity, 2 if alone else s % 2)
             left = low
     w.swept[s] = k - low
     for p in range(begin, end):
         pair = ls.sorted[p]
-        if k < room:
+        if k < capacity:
             put_pair(ls, c, k, ls.raw_i[pair], ls.raw_j[pair] & PLACE_BITS)
         k += 1
     return k
@@ -182,7 +182,7 @@ def place_lanes(w: cython.pointer(Step), ls: cython.pointer(Lists), s: cython.Py
     if w.lanes[s] > ls.held_lanes[s]:
         ls.held_lanes[s] = (w.lanes[s] + 7) // 8 * 8 + SPARE_LANES
         w.begin[s] = team_reserve(w.team, ls.held_lanes[s])
-    if w.lanes[s] > 0 and w.begin[s] + ls.held_lanes[s] > ls.lanes_room:
+    if w.lanes[s] > 0 and w.begin[s] + ls.held_lanes[s] > ls.lanes_capacity:
         return False
     for k in range(w.lanes[s]):
         w.i[w.begin[s] + k], w.j[w.begin[s] + k] = ls.put_i[low + k], ls.put_j[low + k]

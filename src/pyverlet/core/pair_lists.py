@@ -34,10 +34,10 @@ Lists = cython.struct(
     listed=cython.bint,  # whether there are lanes, with current impulses
     good=cython.bint,  # whether they match the current particles
     stale=cython.bint,  # whether it may be invalid in the next substep
-    harvested=cython.bint,  # whether contact state is stored in `kept`
+    impulses_stored=cython.bint,  # whether contact state is stored in `kept`
     short=cython.bint,  # whether arrays were too small
     refill=cython.bint,  # whether materials of pairs have changed
-    mending=cython.bint,  # whether particles were added or removed since it was made
+    patching=cython.bint,  # whether particles were added or removed since it was made
     anew=cython.bint,  # whether all groups must be listed, not only `dirty` ones
     tied=cython.bint,  # whether coincident particles were listed: the direction of their pair depends on their numbers
     rebuilds=int64_t,
@@ -53,7 +53,7 @@ Lists = cython.struct(
     momenta=cython.p_double,  # (blocks, 3) sum of velocities of free particles, and their number
     speeds=cython.pointer(real),  # (blocks,) square of the largest speed relative to their mean
     # ---- who makes no pairs
-    picky=cython.bint,
+    tests_pairs=cython.bint,
     brute=cython.bint,  # whether all pairs are listed
     filtered=cython.bint,
     category=cython.pointer(uint32_t),
@@ -68,23 +68,23 @@ Lists = cython.struct(
     cut=cython.pointer(int64_t),  # (groups + 1,) first row and number of particles of each, for the next list
     held=cython.pointer(int64_t),
     dirty=cython.pointer(uint8_t),  # (groups,) whether particles of its pairs were added or removed since it was listed
-    place=cython.pointer(int32_t),  # new slot of each slot, or -1; while slots are renumbered
+    place=cython.pointer(int32_t),  # new row of each row, or -1; while rows are renumbered
     # ---- pairs as they are found: places in the order of the cells, one group at a time in the scratch memory of a thread
     found=cython.pointer(int64_t),  # (groups,)
     most=int64_t,  # most pairs, or lanes, of any group
-    scratch_room=cython.Py_ssize_t,  # pairs, and lanes, of each thread's scratch memory
-    raw_i=cython.pointer(uint32_t),  # (threads scratch_room,)
+    scratch_capacity=cython.Py_ssize_t,  # pairs, and lanes, of each thread's scratch memory
+    raw_i=cython.pointer(uint32_t),  # (threads scratch_capacity,)
     raw_j=cython.pointer(uint32_t),
     key=cython.pointer(uint8_t),  # colour of each
     sorted=cython.pointer(uint32_t),  # pairs by colour
     rest=cython.pointer(uint32_t),  # pairs left over from batches of one colour
-    put_i=cython.pointer(uint32_t),  # lanes of the group: slots, and the vector from i to j, m
+    put_i=cython.pointer(uint32_t),  # lanes of the group: rows, and the vector from i to j, m
     put_j=cython.pointer(uint32_t),
     put_x=cython.pointer(real),
     put_y=cython.pointer(real),
     used=cython.pointer(uint32_t),  # (count,) colours used at each place
     batch=cython.pointer(uint32_t),  # (count,) last batch at each place
-    lanes_room=cython.Py_ssize_t,  # room of the lane arrays
+    lanes_capacity=cython.Py_ssize_t,  # room of the lane arrays
     held_lanes=cython.pointer(int64_t),  # (groups,) lanes reserved for each
     looked=cython.pointer(int64_t),  # (groups,) pairs that were checked
     beyond=cython.pointer(int64_t),  # (groups,) pairs of these that a thinner skin would not list
@@ -126,7 +126,7 @@ def may_touch(
 @inlined
 def test_run(
     c: cython.pointer(Cells), ls: cython.pointer(Lists), inverse_mass: cython.pointer(real), a: int64_t, u: real, v: real,
-    low: int64_t, end: int64_t, found: int64_t, room: int64_t,
+    low: int64_t, end: int64_t, found: int64_t, capacity: int64_t,
 ) -> int64_t:  # fmt: skip
     """Write the places `low` up to `end` that are near place a, seen at (u, v), from `found` on; returns the end of pairs."""
     b: int64_t
@@ -148,8 +148,8 @@ def test_run(
         while bits != 0:
             lane = lowest_bit(bits)
             bits &= bits - 1
-            if not ls.picky or may_touch(c, ls, inverse_mass, a, b + lane):
-                if found < room:
+            if not ls.tests_pairs or may_touch(c, ls, inverse_mass, a, b + lane):
+                if found < capacity:
                     ls.raw_i[found] = cython.cast(uint32_t, a)
                     ls.raw_j[found] = cython.cast(uint32_t, b + lane) | (cython.cast(uint32_t, (close >> lane) & 1) << 31)
                 found += 1
@@ -159,7 +159,7 @@ def test_run(
 @kernel
 def test_row(
     c: cython.pointer(Cells), ls: cython.pointer(Lists), inverse_mass: cython.pointer(real), a: int64_t, level: cython.int,
-    row: int64_t, left: int64_t, right: int64_t, shift_v: real, found: int64_t, room: int64_t,
+    row: int64_t, left: int64_t, right: int64_t, shift_v: real, found: int64_t, capacity: int64_t,
 ) -> int64_t:  # fmt: skip
     """`test_run` for columns `left` to `right` of a row, which continues with images in a periodic room."""
     wide: int64_t = c.width[level]
@@ -169,22 +169,22 @@ def test_row(
     low: int64_t = c.start[first + max(left, 0)]
     end: int64_t = c.start[first + max(min(right, wide - 1), -1) + 1]  # NaN is in the lowest cell
     if low < end:
-        found = test_run(c, ls, inverse_mass, a, u, v, low, end, found, room)
+        found = test_run(c, ls, inverse_mass, a, u, v, low, end, found, capacity)
     if c.wraps_u and left < 0:
         low, end = c.start[first + max(wide + left, 0)], c.start[first + wide]
         if low < end:
-            found = test_run(c, ls, inverse_mass, a, u + c.period_u, v, low, end, found, room)
+            found = test_run(c, ls, inverse_mass, a, u + c.period_u, v, low, end, found, capacity)
     if c.wraps_u and right >= wide:
         low, end = c.start[first], c.start[first + min(right - wide, wide - 1) + 1]
         if low < end:
-            found = test_run(c, ls, inverse_mass, a, u - c.period_u, v, low, end, found, room)
+            found = test_run(c, ls, inverse_mass, a, u - c.period_u, v, low, end, found, capacity)
     return found
 
 
 @kernel
 def test_smaller(
     c: cython.pointer(Cells), ls: cython.pointer(Lists), inverse_mass: cython.pointer(real), a: int64_t, other: cython.int,
-    least: int64_t, most: int64_t, ahead: real, found: int64_t, room: int64_t,
+    least: int64_t, most: int64_t, ahead: real, found: int64_t, capacity: int64_t,
 ) -> int64_t:  # fmt: skip
     """`test_row` for the grid `other` of smaller circles, in its rows from `least` up to `most`, around place a.
 
@@ -220,12 +220,14 @@ def test_smaller(
             left, right = whole_below((x - half) * across), whole_below((x + half) * across)
         else:
             left, right = cell_number((x - half) * across, wide), cell_number((x + half) * across, wide)
-        found = test_row(c, ls, inverse_mass, a, other, row - turns * high, left, right, turns * c.period_v - ahead, found, room)
+        found = test_row(
+            c, ls, inverse_mass, a, other, row - turns * high, left, right, turns * c.period_v - ahead, found, capacity
+        )
     return found
 
 
 @kernel
-def none_meet(c: cython.pointer(Cells), ls: cython.pointer(Lists), s: cython.Py_ssize_t, level: cython.int) -> cython.bint:
+def none_collide(c: cython.pointer(Cells), ls: cython.pointer(Lists), s: cython.Py_ssize_t, level: cython.int) -> cython.bint:
     """Whether in a grid no two circles of group s and the row above may collide, such as particles of a fluid."""
     first: int64_t = c.base[level] + (ls.row[s] << c.shift[level]) * c.width[level]
     end: int64_t = c.base[level] + min((ls.row[s + 1] + 1) << c.shift[level], c.height[level]) * c.width[level]
@@ -243,7 +245,7 @@ def none_meet(c: cython.pointer(Cells), ls: cython.pointer(Lists), s: cython.Py_
 @kernel
 def list_rows(
     c: cython.pointer(Cells), ls: cython.pointer(Lists), inverse_mass: cython.pointer(real), s: cython.Py_ssize_t,
-    found: int64_t, room: int64_t,
+    found: int64_t, capacity: int64_t,
 ) -> int64_t:  # fmt: skip
     """Write the pairs of group s, a group of rows, from `found` on; returns their end, even beyond the room."""
     level: cython.int
@@ -254,7 +256,7 @@ def list_rows(
         shift: int64_t = c.shift[level]
         wide: int64_t = c.width[level]
         high: int64_t = c.height[level]
-        alone: cython.bint = none_meet(c, ls, s, level)
+        alone: cython.bint = none_collide(c, ls, s, level)
         for row in range(ls.row[s] << shift, ls.row[s + 1] << shift):
             this: int64_t = c.base[level] + row * wide
             for a in range(c.start[this], c.start[this + wide]):
@@ -263,20 +265,20 @@ def list_rows(
                     # The rest of this row; in the row above, COLUMNS to the left and to the right.
                     end: int64_t = c.start[this + min(column + COLUMNS, wide - 1) + 1]
                     if a + 1 < end:
-                        found = test_run(c, ls, inverse_mass, a, c.spot_u[a], c.spot_v[a], a + 1, end, found, room)
+                        found = test_run(c, ls, inverse_mass, a, c.spot_u[a], c.spot_v[a], a + 1, end, found, capacity)
                     if c.wraps_u and column + COLUMNS >= wide:
                         end = c.start[this + min(column + COLUMNS - wide, wide - 1) + 1]
                         found = test_run(
-                            c, ls, inverse_mass, a, c.spot_u[a] - c.period_u, c.spot_v[a], c.start[this], end, found, room
+                            c, ls, inverse_mass, a, c.spot_u[a] - c.period_u, c.spot_v[a], c.start[this], end, found, capacity
                         )
                     left: int64_t = column - COLUMNS
                     if row + 1 < high:
-                        found = test_row(c, ls, inverse_mass, a, level, row + 1, left, column + COLUMNS, 0, found, room)
+                        found = test_row(c, ls, inverse_mass, a, level, row + 1, left, column + COLUMNS, 0, found, capacity)
                     elif c.wraps_v:
-                        found = test_row(c, ls, inverse_mass, a, level, 0, left, column + COLUMNS, c.period_v, found, room)
+                        found = test_row(c, ls, inverse_mass, a, level, 0, left, column + COLUMNS, c.period_v, found, capacity)
                 for other in range(level + 1, c.levels):
                     least: int64_t = ls.row[s] << c.shift[other]
-                    found = test_smaller(c, ls, inverse_mass, a, other, least, 2 * c.height[other], 0, found, room)
+                    found = test_smaller(c, ls, inverse_mass, a, other, least, 2 * c.height[other], 0, found, capacity)
     # Pairs of a circle in the first row above and a smaller one below belong to this group, too.
     over: int64_t = ls.row[s + 1]
     ahead: real = 0
@@ -292,14 +294,14 @@ def list_rows(
                 for other in range(level + 1, c.levels):
                     shift = c.shift[other]
                     found = test_smaller(
-                        c, ls, inverse_mass, a, other, ls.row[s] << shift, ls.row[s + 1] << shift, ahead, found, room
+                        c, ls, inverse_mass, a, other, ls.row[s] << shift, ls.row[s + 1] << shift, ahead, found, capacity
                     )
     return found
 
 
 @kernel
 def list_alone(
-    c: cython.pointer(Cells), ls: cython.pointer(Lists), inverse_mass: cython.pointer(real), found: int64_t, room: int64_t
+    c: cython.pointer(Cells), ls: cython.pointer(Lists), inverse_mass: cython.pointer(real), found: int64_t, capacity: int64_t
 ) -> int64_t:
     """Write the pairs of circles without a cell, the last group."""
     a: int64_t
@@ -309,11 +311,11 @@ def list_alone(
     for a in range(c.celled, c.count):
         for level in range(c.levels):
             high: int64_t = c.height[level]
-            found = test_smaller(c, ls, inverse_mass, a, level, -high if c.wraps_v else 0, 2 * high, 0, found, room)
+            found = test_smaller(c, ls, inverse_mass, a, level, -high if c.wraps_v else 0, 2 * high, 0, found, capacity)
         for along in range(-1, 2):
             for across in range(-1, 2):
                 if (along == 0 or c.wraps_v) and (across == 0 or c.wraps_u):
                     u: real = c.spot_u[a] - across * c.period_u
                     v: real = c.spot_v[a] - along * c.period_v
-                    found = test_run(c, ls, inverse_mass, a, u, v, a + 1, c.count, found, room)
+                    found = test_run(c, ls, inverse_mass, a, u, v, a + 1, c.count, found, capacity)
     return found

@@ -17,7 +17,7 @@ from pyverlet.core.pair_lists import INDEX_WORDS, Lists
 from pyverlet.core.step import TOUCHED, Step
 
 GONE = cython.declare(uint32_t, 0xFFFFFFFF)
-"""Replaces slots of removed particles."""
+"""Replaces rows of removed particles."""
 
 NORMALS = cython.declare(cython.int, 0)
 TANGENTS = cython.declare(cython.int, 1)
@@ -45,7 +45,7 @@ def clear_chains(w: cython.pointer(Step), ls: cython.pointer(Lists)) -> cython.v
 
 
 @inlined
-def hang(ls: cython.pointer(Lists), low: uint32_t, high: uint32_t, k: int64_t) -> cython.void:
+def chain_pair(ls: cython.pointer(Lists), low: uint32_t, high: uint32_t, k: int64_t) -> cython.void:
     """Add lane k, a contact of these two particles, to their chain."""
     chain: cython.Py_ssize_t = chain_of(ls, low, high)
     ls.kept_other[INDEX_WORDS * k] = high
@@ -71,7 +71,7 @@ def keep_impulses(w: cython.pointer(Step), ls: cython.pointer(Lists), s: cython.
                 w.tangent_impulse[k] = 0
             if w.rollings and not w.rolls:
                 w.roll_impulse[k] = 0
-            hang(ls, min(w.i[k], w.j[k]), max(w.i[k], w.j[k]), k)
+            chain_pair(ls, min(w.i[k], w.j[k]), max(w.i[k], w.j[k]), k)
 
 
 @kernel

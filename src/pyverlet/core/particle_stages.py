@@ -12,7 +12,7 @@ from pyverlet.core.step import Step
 
 
 @inlined
-def note_moves(w: cython.pointer(Step), a: cython.Py_ssize_t, b: cython.Py_ssize_t) -> cython.void:
+def update_moved(w: cython.pointer(Step), a: cython.Py_ssize_t, b: cython.Py_ssize_t) -> cython.void:
     """Compute displacements since particles were listed."""
     moved: cython.pointer(real) = w.moved
     position: cython.pointer(real) = w.position
@@ -28,7 +28,7 @@ def kick(shared: cython.pointer(Step), a: cython.Py_ssize_t, b: cython.Py_ssize_
     w: cython.pointer(Step) = cython.address(own)
     begins: cython.bint = w.substep == w.first
     kicked: real = w.opening if begins else w.h
-    back: real = w.taken_back if begins else cython.cast(real, 0)
+    back: real = w.already_given if begins else cython.cast(real, 0)
     most: real = 0
     if w.rough:
         for i in range(a, b):
@@ -54,7 +54,7 @@ def kick(shared: cython.pointer(Step), a: cython.Py_ssize_t, b: cython.Py_ssize_
             w.velocity[2 * i], w.velocity[2 * i + 1], w.free[2 * i], w.free[2 * i + 1] = x, y, x, y
             square = x * x + y * y
             most = square if square > most else most
-    note_moves(w, a, b)
+    update_moved(w, a, b)
     since: cython.pointer(cython.double) = w.since
     for i in range(a, b):
         since[i] = 0
@@ -124,7 +124,7 @@ def moves_stage(what: cython.p_void, item: cython.int) -> cython.void:
     """Compute displacements of a block of particles."""
     w: cython.pointer(Step) = cython.cast(cython.pointer(Step), what)
     block: cython.int = w.awake[item]
-    note_moves(w, block * BLOCK, min((block + 1) * BLOCK, w.count))
+    update_moved(w, block * BLOCK, min((block + 1) * BLOCK, w.count))
 
 
 @kernel

@@ -28,17 +28,19 @@ def placed(value: int32_t, shift: cython.int) -> uint32_t:
 
 
 @inlined
-def beside(pixel: uint32_t, ground: uint32_t, colour: uint32_t, cover: int32_t, shift: cython.int) -> uint32_t:
+def blended_channel(pixel: uint32_t, background: uint32_t, colour: uint32_t, cover: int32_t, shift: cython.int) -> uint32_t:
     """A channel after `cover` / 255 of the pixel's ground has become `colour`. (257 x + 2^15) >> 16 is x / 255, rounded."""
-    c: int32_t = cover * (channel(colour, shift) - channel(ground, shift))
+    c: int32_t = cover * (channel(colour, shift) - channel(background, shift))
     return placed(channel(pixel, shift) + ((c * 257 + 32768) >> 16), shift)
 
 
 @inlined
-def over(pixel: uint32_t, ground: uint32_t, colour: uint32_t, cover: int32_t, kept: cython.double, shift: cython.int) -> uint32_t:
+def over(
+    pixel: uint32_t, background: uint32_t, colour: uint32_t, cover: int32_t, kept: cython.double, shift: cython.int
+) -> uint32_t:
     """A channel of a pixel without ground: the fraction `kept` of its old colour, plus `cover` / 255 of `colour`."""
     covered: int32_t = cython.cast(int32_t, pixel >> 24)
-    old: int32_t = 255 * channel(pixel, shift) - (255 - covered) * channel(ground, shift)
+    old: int32_t = 255 * channel(pixel, shift) - (255 - covered) * channel(background, shift)
     return placed(cython.cast(int32_t, (old * kept + cover * channel(colour, shift)) / 255.0 + 0.5), shift)
 
 
@@ -66,7 +68,7 @@ def over_full(pixel: uint32_t, colour: uint32_t, cover: int32_t) -> uint32_t:
 
 
 @inlined
-def blend(pixel: uint32_t, ground: uint32_t, colour: uint32_t, cover: int32_t) -> uint32_t:
+def blend(pixel: uint32_t, background: uint32_t, colour: uint32_t, cover: int32_t) -> uint32_t:
     """The pixel after `cover` / 255 of it shows `colour`: first on uncovered ground, then over what is there.
 
     Coverages of rims in one pixel add up in any order; a shape hides another only if there is no ground left.
@@ -77,11 +79,11 @@ def blend(pixel: uint32_t, ground: uint32_t, colour: uint32_t, cover: int32_t) -
     excess: int32_t = covered + cover - 255
     rgb: uint32_t
     if excess <= 0:
-        rgb = beside(pixel, ground, colour, cover, 0) | beside(pixel, ground, colour, cover, 8)
-        return rgb | beside(pixel, ground, colour, cover, 16) | (cython.cast(uint32_t, covered + cover) << 24)
+        rgb = blended_channel(pixel, background, colour, cover, 0) | blended_channel(pixel, background, colour, cover, 8)
+        return rgb | blended_channel(pixel, background, colour, cover, 16) | (cython.cast(uint32_t, covered + cover) << 24)
     kept: cython.double = cython.cast(cython.double, covered - excess) / covered
-    rgb = over(pixel, ground, colour, cover, kept, 0) | over(pixel, ground, colour, cover, kept, 8)
-    return rgb | over(pixel, ground, colour, cover, kept, 16) | OPAQUE
+    rgb = over(pixel, background, colour, cover, kept, 0) | over(pixel, background, colour, cover, kept, 8)
+    return rgb | over(pixel, background, colour, cover, kept, 16) | OPAQUE
 
 
 @inlined

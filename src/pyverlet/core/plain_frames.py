@@ -6,11 +6,11 @@ from __future__ import annotations
 import cython
 from cython.cimports.lanes import real
 from cython.cimports.libc.stdint import uint32_t
-from cython.cimports.team import team_clock, team_run, team_told
+from cython.cimports.team import team_clock, team_run, team_spent
 
+from pyverlet.core.contact_recording import begin_records
 from pyverlet.core.frame_ends import all_finite
 from pyverlet.core.kernels import inlined, kernel
-from pyverlet.core.noting import begin_notes
 from pyverlet.core.rows import MovingRows, put_rows, take_rows
 from pyverlet.core.running import run_substeps
 from pyverlet.core.spans import INTEGRATE, LISTS, NOTES, OTHER
@@ -42,11 +42,11 @@ MARKED = cython.declare(cython.int, 4)
 
 Plain = cython.struct(
     w=cython.pointer(Step),
-    taken=cython.pointer(MovingRows),  # the user's rows to slots
-    put=cython.pointer(MovingRows),  # slots to the user's rows
+    taken=cython.pointer(MovingRows),  # the user's rows to rows
+    put=cython.pointer(MovingRows),  # rows to the user's rows
     radius=cython.pointer[cython.const[real]],  # the user's columns
     mass=cython.pointer[cython.const[real]],
-    slot_mass=cython.pointer[cython.const[real]],
+    sorted_mass=cython.pointer[cython.const[real]],
     restitution=cython.pointer[cython.const[real]],
     friction=cython.pointer[cython.const[real]],
     rolling=cython.pointer[cython.const[real]],
@@ -138,8 +138,8 @@ def begin_plain(p: cython.pointer(Plain)) -> cython.void:
     if p.limited:
         p.energy = block_energy(m.x_from, m.v_from, m.v_from, 0.0, m.s_from, p.radius, p.mass, p.gx, p.gy, 0, w.count)
     w.still_known = False
-    if w.noting:
-        begin_notes(w)
+    if w.records_contacts:
+        begin_records(w)
     w.first, w.substep, w.substeps = 0, 0, p.substeps
     charge(p, INTEGRATE)
 
@@ -151,7 +151,7 @@ def charge_contacts(p: cython.pointer(Plain)) -> cython.void:
     spent: cython.double = 0
     charge(p, OTHER)
     for k in range(LISTS, NOTES + 1 if p.w.team.timed else 0):
-        team_told(p.w.team, k, cython.address(spent))
+        team_spent(p.w.team, k, cython.address(spent))
         p.last[k] = p.last[k] + spent
         p.last[OTHER] = p.last[OTHER] - spent
 
@@ -164,7 +164,7 @@ def end_plain(p: cython.pointer(Plain)) -> cython.int:
     good: cython.bint = all_finite(w)
     if good and p.limited:
         now: cython.double = block_energy(
-            w.position, w.velocity, w.velocity, 0.0, w.spin, w.radius, p.slot_mass, p.gx, p.gy, 0, w.count
+            w.position, w.velocity, w.velocity, 0.0, w.spin, w.radius, p.sorted_mass, p.gx, p.gy, 0, w.count
         )
         good = not (now - p.energy > p.most * (PLACED if p.placed else 1))
     charge(p, FINISH)

@@ -32,17 +32,17 @@ class PlainFrames:
 
     Args:
         engine: which has made such a frame.
-        turn: the lock of the world, `ground.step_lock`; taken here, without running Python code, so that no Ctrl-C intervenes.
-        slots, state: position, velocity, acceleration and spin in the engine's order, and in the user's.
+        lock: that of the world, `common.step_lock`; taken here, without running Python code, so that no Ctrl-C intervenes.
+        rows, state: position, velocity, acceleration and spin in the engine's order, and in the user's.
         placed: (n,) becomes 1 where the user has moved a particle.
-        order: (n,) the user's index in each slot.
+        order: (n,) the user's index of each row.
         angle: (n,) in the user's order.
         slot_mass: (n,) kg.
         numbers, marks: the user's columns, which must stay unchanged.
         law: (6,) seconds and substeps of a frame, gravity, J that a frame may gain, infinite for no limit, and m from the
             origin up to which coordinates are precise enough for particles at rest.
         same: (object, name, value): attributes that must stay unchanged; of the world if the object is None.
-        checked, changes: such attributes, which change only when `changes.latest` does; see `ground.checked`.
+        checked, changes: such attributes, which change only when `changes.latest` does; see `common.checked`.
         obstacles: such attributes, which change with obstacles; see `world.plain.follow`.
         empty: lists that must stay empty.
         end: called with the world and this object to end a frame that is in doubt, while `pending`.
@@ -60,7 +60,7 @@ class PlainFrames:
     taken: MovingRows
     put: MovingRows
     engine: Engine
-    turn = cython.declare(object)
+    lock = cython.declare(object)
     arrays = cython.declare(tuple)
     same = cython.declare(tuple)  # object, name and value, one after the other: a tuple each took a cache line each
     checked = cython.declare(tuple)
@@ -76,12 +76,12 @@ class PlainFrames:
     used = cython.declare(cython.bint, visibility="readonly")
 
     def __init__(
-        self, engine: Engine, turn, slots, placed, state, order, angle, slot_mass, numbers, marks, law, same, checked,
+        self, engine: Engine, lock, rows, placed, state, order, angle, sorted_mass, numbers, marks, law, same, checked,
         changes, obstacles, empty, end, times,
     ):  # fmt: skip
         p: cython.pointer(Plain) = cython.address(self.p)
         count: cython.Py_ssize_t = len(order)
-        self.engine, self.turn, self.obstacles, self.empty, self.end = engine, turn, obstacles, empty, end
+        self.engine, self.lock, self.obstacles, self.empty, self.end = engine, lock, obstacles, empty, end
         self.same, self.checked = tuple(chain.from_iterable(same)), tuple(chain.from_iterable(checked))
         self.changes, self.seen = changes, None
         value: cython.p_double = doubles(law)
@@ -92,14 +92,14 @@ class PlainFrames:
         self.limited = p.limited = p.most < INFINITY
         p.status, p.w = MADE, cython.address(engine.w)
         p.taken, p.put = cython.address(self.taken), cython.address(self.put)
-        map_motion(p.taken, slots, state, order)
-        map_motion(p.put, state, slots, order)
+        map_motion(p.taken, rows, state, order)
+        map_motion(p.put, state, rows, order)
         self.taken.placed, none = octets(placed), np.zeros(1, np.uint8)
-        known, marked, self.given = np.array(numbers), np.array(marks), np.zeros((count, 3), slot_mass.dtype)
-        self.arrays = (slots, placed, state, order, angle, slot_mass, numbers, marks, times, none, known, marked)
+        known, marked, self.given = np.array(numbers), np.array(marks), np.zeros((count, 3), sorted_mass.dtype)
+        self.arrays = (rows, placed, state, order, angle, sorted_mass, numbers, marks, times, none, known, marked)
         p.put.turned, p.put.half_dt, p.put.skips = doubles(angle), 0.5 * self.dt, False
         p.put.still, p.put.written = const_octets(none), octets(none)
-        p.slot_mass = const_reals(slot_mass)
+        p.sorted_mass = const_reals(sorted_mass)
         p.radius, p.mass, p.restitution = const_reals_in(numbers, 0), const_reals_in(numbers, 1), const_reals_in(numbers, 2)
         p.friction, p.rolling, p.inertia = const_reals_in(numbers, 3), const_reals_in(numbers, 4), const_reals_in(numbers, 5)
         p.category, p.mask = const_indices_in(marks, 0), const_indices_in(marks, 1)
@@ -125,10 +125,10 @@ class PlainFrames:
     @cython.cfunc
     def enter(self, world) -> cython.bint:
         """Take the lock, if it is free and nothing has changed; returns whether it did."""
-        turn = self.turn
-        if turn.holder is not None or turn.page is not None or turn._door.locked() or not turn._room.acquire(False):
+        lock = self.lock
+        if lock.holder is not None or lock.page is not None or lock._queue.locked() or not lock._lock.acquire(False):
             return False
-        turn.holder, turn._depth, turn.in_frame = get_ident(), 1, True
+        lock.holder, lock._depth, lock.in_frame = get_ident(), 1, True
         self.p.status = MADE
         latest = self.changes.latest
         if latest != self.seen:
@@ -140,7 +140,7 @@ class PlainFrames:
         for listed in self.empty:
             if len(listed) > 0:
                 self.p.status = OTHERS
-        if self.p.status == OTHERS or self.engine.ls.mending:
+        if self.p.status == OTHERS or self.engine.ls.patching:
             self.leave()
             return False
         self.seen = latest
@@ -157,9 +157,9 @@ class PlainFrames:
     @cython.cfunc
     def leave(self):
         """Release the lock."""
-        turn = self.turn
-        turn.holder, turn._depth, turn.in_frame = None, 0, False
-        turn._room.release()
+        lock = self.lock
+        lock.holder, lock._depth, lock.in_frame = None, 0, False
+        lock._lock.release()
 
     @cython.cfunc
     def go_on(self):
@@ -173,13 +173,13 @@ class PlainFrames:
                     run_plain(p)
             if p.status != SHORT:
                 return
-            self.make_room()
+            self.reserve()
 
     @cython.cfunc
-    def make_room(self):
+    def reserve(self):
         """Enlarge arrays for pairs and surfaces, or save records."""
         if self.engine.ls.short:
-            self.engine.make_room()
+            self.engine.reserve()
 
     @cython.cfunc
     def close(self, world) -> cython.bint:

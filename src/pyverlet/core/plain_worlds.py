@@ -82,7 +82,7 @@ class PlainWorlds:
             if plain is None:
                 continue
             if not cython.compiled or plain.p.status == SHORT:
-                plain.make_room()
+                plain.reserve()
                 plain.go_on()
             counts[k] = frames - plain.p.left
             try:

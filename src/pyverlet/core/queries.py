@@ -65,7 +65,7 @@ def list_discs(
     to: cython.pointer(int32_t) = small_integers(member)
     count: cython.Py_ssize_t = len(position)
     sized: cython.bint = len(radius) > 0
-    room: int64_t = len(member)
+    capacity: int64_t = len(member)
     found: int64_t = 0
     per: cython.double = 1.0 / cell
     k: int64_t
@@ -92,7 +92,7 @@ def list_discs(
                             first[k + 1] += 1
                         else:
                             first[k + 2] += 1
-            if found > room:
+            if found > capacity:
                 break
             if not fill:
                 for k in range(columns * rows):
@@ -138,7 +138,7 @@ def in_regions(lower, upper, center, size, cells, position, query, particle, lat
     of: cython.pointer[int64_t] = integers(query)
     which: cython.pointer[int64_t] = integers(particle)
     count: int64_t = len(lower)
-    room: int64_t = len(query)
+    capacity: int64_t = len(query)
     found: int64_t = 0
     k: int64_t
     with cython.nogil:
@@ -157,7 +157,7 @@ def in_regions(lower, upper, center, size, cells, position, query, particle, lat
                     dx: cython.double = x - middle[2 * q]
                     dy: cython.double = y - middle[2 * q + 1]
                     if far[q] == INFINITY or dx * dx + dy * dy <= far[q] * far[q]:
-                        if found < room:
+                        if found < capacity:
                             of[found] = q
                             which[found] = i
                         found += 1
@@ -169,23 +169,23 @@ def offer(
     index: cython.pointer[int64_t],
     square: cython.p_double,
     at: int64_t,
-    room: int64_t,
+    capacity: int64_t,
     count: int64_t,
     i: int64_t,
     value: cython.double,
 ) -> int64_t:
     """Insert particle i into the nearest so far, ordered by square distance, then index; returns their number."""
-    last: int64_t = at + room - 1
-    if count == room and (value > square[last] or (value == square[last] and i > index[last])):
+    last: int64_t = at + capacity - 1
+    if count == capacity and (value > square[last] or (value == square[last] and i > index[last])):
         return count
-    k: int64_t = at + min(count, room - 1)
+    k: int64_t = at + min(count, capacity - 1)
     while k > at and (square[k - 1] > value or (square[k - 1] == value and index[k - 1] > i)):
         square[k] = square[k - 1]
         index[k] = index[k - 1]
         k -= 1
     square[k] = value
     index[k] = i
-    return min(count + 1, room)
+    return min(count + 1, capacity)
 
 
 def nearest_to(points, cells, position, index, square):
@@ -200,7 +200,7 @@ def nearest_to(points, cells, position, index, square):
     p: cython.pointer[cython.const[real]] = const_reals(position)
     which: cython.pointer[int64_t] = integers(index)
     far: cython.p_double = doubles(square)
-    room: int64_t = index.shape[1]
+    capacity: int64_t = index.shape[1]
     questions: int64_t = len(points)
     k: int64_t
     with cython.nogil:
@@ -210,7 +210,7 @@ def nearest_to(points, cells, position, index, square):
             reach: cython.double = 0.5 * c.cell
             whole: cython.bint = False
             count: int64_t = 0
-            while not whole and (count < room or far[q * room + room - 1] > reach * reach * (1.0 - 1e-12)):
+            while not whole and (count < capacity or far[q * capacity + capacity - 1] > reach * reach * (1.0 - 1e-12)):
                 reach *= 2.0
                 count = 0
                 left: int64_t = column_of(c, x - reach)
@@ -223,4 +223,4 @@ def nearest_to(points, cells, position, index, square):
                         i: int64_t = c.member[k]
                         dx: cython.double = p[2 * i] - x
                         dy: cython.double = p[2 * i + 1] - y
-                        count = offer(which, far, q * room, room, count, i, dx * dx + dy * dy)
+                        count = offer(which, far, q * capacity, capacity, count, i, dx * dx + dy * dy)

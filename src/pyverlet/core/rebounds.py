@@ -22,24 +22,24 @@ ELASTICITY = cython.declare(cython.int, 3)  # e
 STRUCK = cython.declare(cython.int, 4)  # impulse of the impact without links, m/s
 FORMER = cython.declare(cython.int, 5)  # m/s along the normal before the impact
 STRUCK_AT = cython.declare(cython.int, 6)  # s into the substep
-VOLLEY = cython.declare(cython.int, 7)  # as in `Step`: rows with other numbers are outdated
+STAMP = cython.declare(cython.int, 7)  # as in `Step`: rows with other numbers are outdated
 IN_LIST = cython.declare(cython.int, 8)  # for pairs: whether it is in the list of its group
 KEPT = cython.declare(cython.int, 9)  # fraction of an impulse that its particles keep; 0: other impacts have made it fast enough
 LACKS = cython.declare(cython.int, 10)  # m/s missing
 TRIED = cython.declare(cython.int, 11)  # last impulse, m/s
 GAINED = cython.declare(cython.int, 12)  # change of velocity by it
 LAST = cython.declare(cython.int, 13)  # velocity after it
-BLOW_WAY = cython.declare(cython.int, 14)  # (2) the normal at the time of the whole impact, which STRUCK_AT is then
+IMPACT_WAY = cython.declare(cython.int, 14)  # (2) the normal at the time of the whole impact, which STRUCK_AT is then
 ADDED = cython.declare(cython.int, 16)  # impulses beyond STRUCK, m/s
 
 FIRST_LACK = cython.declare(cython.int, 0)
 MEASURE_GAIN = cython.declare(cython.int, 1)
 LACK_LESS = cython.declare(cython.int, 2)
 STRIKE_MORE = cython.declare(cython.int, 3)
-TAKE_ALL_BACK = cython.declare(cython.int, 4)
-"""Tasks for rows: see `core.blows`."""
+UNDO_ALL = cython.declare(cython.int, 4)
+"""Tasks for rows: see `core.shared_impacts`."""
 
-BLOW = cython.declare(cython.int, 4)
+IMPACT = cython.declare(cython.int, 4)
 """Columns of a linked particle: its velocity change by impacts (2), and what links remove from its velocity before them."""
 
 LEAST_KEPT = cython.declare(cython.double, 1.0 / 64)
@@ -57,36 +57,36 @@ def node_of(w: cython.pointer(Step), i: cython.Py_ssize_t) -> cython.Py_ssize_t:
     """Number of particle i among linked ones, if a rigid link or pin acts on it; -1: none."""
     k: cython.pointer(Links) = w.link_table
     n: cython.Py_ssize_t = w.node[i]
-    return n if n < k.count and cython.cast(cython.Py_ssize_t, k.slot[n]) == i and k.stiff[n] != 0 else -1
+    return n if n < k.count and cython.cast(cython.Py_ssize_t, k.sorted_index[n]) == i and k.stiff[n] != 0 else -1
 
 
 @kernel
-def note_rebound(
+def store_rebound(
     w: cython.pointer(Step), row: cython.pointer(cython.double), at: cython.Py_ssize_t, x: cython.double, y: cython.double,
     speed: cython.double, given: cython.double, e: cython.double, t: cython.double,
 ) -> cython.void:  # fmt: skip
     """Record an impact at time t with the impulse `given` along (x, y), after which the velocity there is `speed`."""
-    if row[at + VOLLEY] != w.volley:
+    if row[at + STAMP] != w.stamp:
         row[at + IN_LIST] = 0
     row[at + WAY_OUT], row[at + WAY_OUT + 1], row[at + AIM], row[at + ELASTICITY] = x, y, speed, e
-    row[at + STRUCK], row[at + FORMER], row[at + STRUCK_AT], row[at + VOLLEY] = given, speed - given, t, w.volley
+    row[at + STRUCK], row[at + FORMER], row[at + STRUCK_AT], row[at + STAMP] = given, speed - given, t, w.stamp
 
 
 @inlined
 def take_aim(
-    row: cython.pointer(cython.double), at: cython.Py_ssize_t, speed: cython.double, taken: cython.double, lent: cython.double,
+    row: cython.pointer(cython.double), at: cython.Py_ssize_t, speed: cython.double, taken: cython.double, extra: cython.double,
     at_once: cython.bint,
 ) -> cython.void:  # fmt: skip
     """Compute the target velocity of a row after all impacts, which have left `speed`.
 
-    Links remove `taken` from the velocity before, which therefore did not hit the surface; nor did `lent`, which links were
+    Links remove `taken` from the velocity before, which therefore did not hit the surface; nor did `extra`, which links were
     assumed to give from the middle of the substep to the impact. at_once: `speed` excludes `taken`. Reductions by other impacts
     are kept. Particles that would not approach once links have acted have no impact.
     """
     since: cython.double = speed - row[at + AIM] - (taken if at_once else 0.0)
     row[at + KEPT] = 0 if since > GOOD * row[at + STRUCK] else 1
-    row[at + AIM] += min(since, 0.0) - (1 + row[at + ELASTICITY]) * (taken - lent)
-    parts: cython.bint = row[at + FORMER] + taken - lent > 0  # links alone separate them
+    row[at + AIM] += min(since, 0.0) - (1 + row[at + ELASTICITY]) * (taken - extra)
+    parts: cython.bint = row[at + FORMER] + taken - extra > 0  # links alone separate them
     if at_once:
         row[at + AIM] += taken
         row[at + FORMER] += taken
@@ -109,7 +109,7 @@ def advance_row(
         row[at + LAST] = speed
         w.rebound_sum[2 * part] += mass * row[at + LACKS] * row[at + LACKS] / kept
         w.rebound_sum[2 * part + 1] += mass * row[at + STRUCK] * row[at + STRUCK]
-    elif w.rebound_task == TAKE_ALL_BACK:
+    elif w.rebound_task == UNDO_ALL:
         return -row[at + ADDED]
     elif w.rebound_task == MEASURE_GAIN:
         row[at + GAINED] = speed - row[at + LAST] - (w.rebound_step - 1) * row[at + GAINED]

@@ -152,7 +152,7 @@ def _team() -> dict[str, Any]:
         "team_reserve_from": lambda team, place: setattr(team, "reserved", place),
         "team_enter": lambda team, span: None,
         "team_clock": time.perf_counter,
-        "team_told": lambda team, span, spent: 0,
+        "team_spent": lambda team, span, spent: 0,
         "team_free": lambda team: None,
     }
 

@@ -31,7 +31,7 @@ LIVELY = cython.declare(cython.double, 4.0)
 
 LEAST_GAIN = cython.declare(cython.double, 1e-5)
 LINKED_GAIN = cython.declare(cython.double, 3e-3)
-"""Allowed relative gain of kinetic energy. Eight substeps add no more than a frame may (`ground.constants.SURPLUS`). With links,
+"""Allowed relative gain of kinetic energy. Eight substeps add no more than a frame may (`common.constants.SURPLUS`). With links,
 velocities in the middle of a substep differ from those at its ends by the square of the angle turned."""
 
 DEEP_PAIR = cython.declare(real, 0.1)

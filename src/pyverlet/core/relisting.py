@@ -54,17 +54,17 @@ def keep_stage(what: cython.p_void, item: cython.int) -> cython.void:
 
 
 @kernel
-def harvest(w: cython.pointer(Step), kept: cython.Py_ssize_t) -> cython.void:
+def store_impulses(w: cython.pointer(Step), kept: cython.Py_ssize_t) -> cython.void:
     """Store contact state in chains, except for the first `kept` groups that are not dirty; other chains are empty."""
     ls: cython.pointer(Lists) = w.lists
     s: cython.Py_ssize_t
     for s in range(kept, w.groups):
         ls.dirty[s] = 1
-    if not ls.harvested:
+    if not ls.impulses_stored:
         clear_chains(w, ls)
     if ls.listed:
         each_group(w, keep_stage)
-    ls.harvested, ls.listed = True, kept > 0
+    ls.impulses_stored, ls.listed = True, kept > 0
 
 
 @kernel
@@ -132,19 +132,19 @@ def list_stage(what: cython.p_void, item: cython.int) -> cython.void:
     if not ls.dirty[s]:
         return
     number: cython.int = team_take_number(w.team)
-    low: int64_t = number * ls.scratch_room
-    room: int64_t = low + ls.scratch_room
+    low: int64_t = number * ls.scratch_capacity
+    capacity: int64_t = low + ls.scratch_capacity
     if ls.brute and alone:
-        found = list_all(w.cells, ls, w.inverse_mass, low, room)
+        found = list_all(w.cells, ls, w.inverse_mass, low, capacity)
     elif alone:
-        found = list_alone(w.cells, ls, w.inverse_mass, low, room)
+        found = list_alone(w.cells, ls, w.inverse_mass, low, capacity)
     else:
-        found = list_rows(w.cells, ls, w.inverse_mass, s, low, room)
+        found = list_rows(w.cells, ls, w.inverse_mass, s, low, capacity)
     ls.found[s] = found - low
     w.lanes[s] = w.swept[s] = 0
-    if found <= room:
-        w.lanes[s] = put_batches(w, ls, w.cells, s, alone, low, found, room) - low
-        if w.lanes[s] <= ls.scratch_room and place_lanes(w, ls, s, low):
+    if found <= capacity:
+        w.lanes[s] = put_batches(w, ls, w.cells, s, alone, low, found, capacity) - low
+        if w.lanes[s] <= ls.scratch_capacity and place_lanes(w, ls, s, low):
             fill_lanes(w, ls, s)
             find_sources(w, ls, s)
             count_far(w, ls, w.cells, s)
@@ -261,7 +261,7 @@ def make_list(w: cython.pointer(Step), again: cython.bint) -> cython.bint:
     blocks: cython.int = cython.cast(cython.int, (w.count + BLOCK - 1) // BLOCK)
     s: cython.Py_ssize_t
     same: cython.bint = again and ls.listed and not ls.anew
-    ls.good, ls.short = False, ls.lanes_room == 0
+    ls.good, ls.short = False, ls.lanes_capacity == 0
     if ls.short:
         return False
     c.velocity, c.stride = (w.motion, 4) if w.rough else (w.velocity, 2)
@@ -276,12 +276,12 @@ def make_list(w: cython.pointer(Step), again: cython.bint) -> cython.bint:
     groups: cython.Py_ssize_t = cut_rows(c, ls)
     kept: cython.Py_ssize_t = kept_groups(ls, groups) if same else 0
     while True:
-        harvest(w, kept)
+        store_impulses(w, kept)
         ls.tied = ls.tied and kept > 0
         lay_groups(w, c, ls, kept, groups)
         each_group(w, list_stage)
         ls.most = most_in_group(w, ls)
-        ls.short = ls.most > ls.scratch_room or team_reserved(w.team) > ls.lanes_room
+        ls.short = ls.most > ls.scratch_capacity or team_reserved(w.team) > ls.lanes_capacity
         if not ls.short:
             break
         for s in range(w.groups):
@@ -305,8 +305,8 @@ def make_list(w: cython.pointer(Step), again: cython.bint) -> cython.bint:
         w.allowed = cython.cast(real, ls.half_skin * ls.half_skin)
         ls.age = 0
     ls.rebuilds += kept == 0
-    ls.listed, ls.good, ls.harvested, ls.refill = True, True, False, ls.refill and kept > 0
-    ls.mending = ls.anew = w.pins = False
+    ls.listed, ls.good, ls.impulses_stored, ls.refill = True, True, False, ls.refill and kept > 0
+    ls.patching = ls.anew = w.pins = False
     for s in range(w.groups):
         w.pins |= w.lanes[s] > w.swept[s]
     find_busy(w)
@@ -341,16 +341,16 @@ def remake_list(what: cython.p_void, item: cython.int) -> cython.void:
 
 
 @inlined
-def renumbered(ls: cython.pointer(Lists), slot: uint32_t) -> uint32_t:
-    """The new number of a slot."""
-    if slot == GONE or ls.place[slot] < 0:
+def renumbered(ls: cython.pointer(Lists), sorted_index: uint32_t) -> uint32_t:
+    """The new number of a row."""
+    if sorted_index == GONE or ls.place[sorted_index] < 0:
         return GONE
-    return cython.cast(uint32_t, ls.place[slot])
+    return cython.cast(uint32_t, ls.place[sorted_index])
 
 
 @kernel
 def renumber_stage(what: cython.p_void, item: cython.int) -> cython.void:
-    """Renumber the slots of a group's pairs, after particles were added or removed."""
+    """Renumber the rows of a group's pairs, after particles were added or removed."""
     w: cython.pointer(Step) = cython.cast(cython.pointer(Step), what)
     s: cython.Py_ssize_t = 2 * item + w.parity
     k: int64_t
@@ -360,7 +360,7 @@ def renumber_stage(what: cython.p_void, item: cython.int) -> cython.void:
 
 @kernel
 def renumber_lanes(what: cython.p_void, item: cython.int) -> cython.void:
-    """Renumber the slots of all pairs."""
+    """Renumber the rows of all pairs."""
     w: cython.pointer(Step) = cython.cast(cython.pointer(Step), what)
     each_group(w, renumber_stage)
 

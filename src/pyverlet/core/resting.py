@@ -12,22 +12,22 @@ from cython.cimports.libc.stdint import int64_t, uint8_t
 from pyverlet.core.islands import find_root, join_listed
 
 
-def time_at_rest(velocity, spin, radius, free, limit: real, dt: cython.float, after: cython.float, calm) -> bool:
-    """calm[i] += dt for slots `free` whose speed, that of the rim included, is at most sqrt(limit radius); otherwise set to 0.
+def time_at_rest(velocity, spin, radius, free, limit: real, dt: cython.float, after: cython.float, sleep_timer) -> bool:
+    """sleep_timer[i] += dt for rows `free` whose speed, with the rim's, is at most sqrt(limit radius); otherwise set to 0.
 
     Returns whether any of them has been at rest for `after` seconds.
     """
     v: cython.pointer[cython.const[real]] = const_reals(velocity)
     w: cython.pointer[cython.const[real]] = const_reals(spin)
     r: cython.pointer[cython.const[real]] = const_reals(radius)
-    slot: cython.pointer[cython.const[int64_t]] = const_integers(free)
-    timer: cython.p_float = singles(calm)
+    sorted_index: cython.pointer[cython.const[int64_t]] = const_integers(free)
+    timer: cython.p_float = singles(sleep_timer)
     count: cython.Py_ssize_t = len(free)
     zero: cython.float = 0
     found: cython.int = 0
     with cython.nogil:
         for k in range(count):
-            i: cython.Py_ssize_t = slot[k]
+            i: cython.Py_ssize_t = sorted_index[k]
             rim: real = w[i] * r[i]
             speed2: real = v[2 * i] * v[2 * i] + v[2 * i + 1] * v[2 * i + 1] + rim * rim
             longer: cython.float = timer[i] + dt
@@ -38,15 +38,15 @@ def time_at_rest(velocity, spin, radius, free, limit: real, dt: cython.float, af
 
 
 def find_islands(
-    position, radius, period_x: real, period_y: real, inverse_mass, calm, pairs, near: real, after: cython.float, root
+    position, radius, period_x: real, period_y: real, inverse_mass, sleep_timer, pairs, near: real, after: cython.float, root
 ):
-    """root[i]: the lowest slot of the island of i, if all of it has been at rest for `after` seconds; else -1.
+    """root[i]: the lowest row of the island of i, if all of it has been at rest for `after` seconds; else -1.
 
     An island is connected by pairs closer than `near` times their contact distance. Pinned circles and sleepers (inverse mass 0)
     belong to none. pairs: as in `join_near_pairs`.
     """
     w: cython.pointer[cython.const[real]] = const_reals(inverse_mass)
-    timer: cython.pointer[cython.const[cython.float]] = const_singles(calm)
+    timer: cython.pointer[cython.const[cython.float]] = const_singles(sleep_timer)
     to: cython.pointer(int64_t) = integers(root)
     count: cython.Py_ssize_t = len(root)
     marks = np.zeros(count, np.uint8)

@@ -1,5 +1,5 @@
 # mypy: ignore-errors
-"""Copies rows between the user's order and slots, and detects changed columns; by a team of threads."""
+"""Copies rows between the user's order and rows, and detects changed columns; by a team of threads."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ ROWS_SHARED = cython.declare(cython.Py_ssize_t, 2048)
 """Rows per work item of a thread."""
 
 STILL = cython.declare(cython.Py_ssize_t, 512)
-"""Slots per `still` flag: a BLOCK of `core.cells`, of which ROWS_SHARED is a multiple."""
+"""Rows per `still` flag: a BLOCK of `core.cells`, of which ROWS_SHARED is a multiple."""
 
 WRITTEN = cython.declare(cython.Py_ssize_t, 4096)
 """The user's rows per flag of written blocks: see `core.checksum`."""
@@ -51,7 +51,7 @@ MovingRows = cython.struct(
 
 @kernel
 def take_rows(what: cython.p_void, block: cython.int) -> cython.void:
-    """Copy rows to a block of slots, and mark those that the user has moved."""
+    """Copy rows to a block of rows, and mark those that the user has moved."""
     m: cython.pointer(MovingRows) = cython.cast(cython.pointer(MovingRows), what)
     for k in range(block * ROWS_SHARED, min((block + 1) * ROWS_SHARED, m.count)):
         i: cython.Py_ssize_t = m.order[k]
@@ -64,7 +64,7 @@ def take_rows(what: cython.p_void, block: cython.int) -> cython.void:
 
 @kernel
 def put_rows(what: cython.p_void, block: cython.int) -> cython.void:
-    """Copy rows of a block of slots back."""
+    """Copy rows of a block of rows back."""
     m: cython.pointer(MovingRows) = cython.cast(cython.pointer(MovingRows), what)
     for b in range(block * ROWS_SHARED // STILL, (min((block + 1) * ROWS_SHARED, m.count) + STILL - 1) // STILL):
         if m.skips and m.still[b]:
@@ -91,30 +91,30 @@ def map_motion(m: cython.pointer(MovingRows), to, of, index):
     m.order = const_small_integers(index)
 
 
-def take_motion(slots, given, index, placed, threads: cython.size_t, parts: cython.int):
-    """Copy position, velocity, acceleration and spin: row k of the slots from row index[k] of those given.
+def take_motion(rows, given, index, placed, threads: cython.size_t, parts: cython.int):
+    """Copy position, velocity, acceleration and spin: row k of the rows from row index[k] of those given.
 
     placed: (n,) set to 1 where the position changes, else 0. threads, parts: address of a team, or 0, and the number of its
     threads to use.
     """
     own: MovingRows
     m: cython.pointer(MovingRows) = cython.address(own)
-    map_motion(m, slots, given, index)
+    map_motion(m, rows, given, index)
     m.placed = octets(placed)
     with cython.nogil:
         by_team(threads, parts, take_rows, m, cython.cast(cython.int, (m.count + ROWS_SHARED - 1) // ROWS_SHARED))
 
 
 def put_motion(
-    slots, given, angle, half_dt: cython.double, index, still, written, threads: cython.size_t, parts: cython.int
+    rows, given, angle, half_dt: cython.double, index, still, written, threads: cython.size_t, parts: cython.int
 ):  # fmt: skip
-    """Copy rows of slots back to the user's. Angles advance by the mean of the old and new spins.
+    """Copy rows of rows back to the user's. Angles advance by the mean of the old and new spins.
 
-    still: (blocks of slots,) which to leave out, or empty. written: (blocks of rows,) set to 1 where one was written.
+    still: (blocks,) which to leave out, or empty. written: (blocks of rows,) set to 1 where one was written.
     """
     own: MovingRows
     m: cython.pointer(MovingRows) = cython.address(own)
-    map_motion(m, given, slots, index)
+    map_motion(m, given, rows, index)
     m.turned, m.half_dt, m.skips = doubles(angle), half_dt, len(still) > 0
     m.still, m.written = const_octets(still), octets(written)
     with cython.nogil:

@@ -23,7 +23,7 @@ from pyverlet.core.waking import find_met
 
 
 @kernel
-def strays_stage(what: cython.p_void, block: cython.int) -> cython.void:
+def moved_far_stage(what: cython.p_void, block: cython.int) -> cython.void:
     """Whether the pair list may be invalid for a particle of a block in the first substep."""
     w: cython.pointer(Step) = cython.cast(cython.pointer(Step), what)
     i: cython.Py_ssize_t
@@ -39,11 +39,11 @@ def strays_stage(what: cython.p_void, block: cython.int) -> cython.void:
 
 
 @kernel
-def strays(w: cython.pointer(Step)) -> cython.bint:
+def any_moved_far(w: cython.pointer(Step)) -> cython.bint:
     """Whether the pair list may be invalid in the first substep."""
     found: cython.bint = False
     blocks: cython.int = cython.cast(cython.int, (w.count + BLOCK - 1) // BLOCK)
-    team_stage(w.team, strays_stage, w, blocks)
+    team_stage(w.team, moved_far_stage, w, blocks)
     for b in range(blocks):
         found |= w.stale[b] != 0
         w.stale[b] = 0  # later substeps set it for particles that move
@@ -53,7 +53,7 @@ def strays(w: cython.pointer(Step)) -> cython.bint:
 @inlined
 def waits(w: cython.pointer(Step)) -> cython.bint:
     """Whether records of the current lists must be saved before they are made anew."""
-    w.waiting = (w.listening or w.noting) and not w.collected
+    w.waiting = (w.records_events or w.records_contacts) and not w.collected
     w.lists.short = w.waiting
     return w.waiting
 
@@ -103,7 +103,7 @@ def refresh(w: cython.pointer(Step)) -> cython.bint:
             ls.refill = False
         stale: cython.bint = ls.stale if w.substep > 0 else False
         if not stale and (w.substep == 0 or not w.falls_free):
-            stale = strays(w)
+            stale = any_moved_far(w)
         if stale and not look_anew(w, False):
             return False
     return True if w.surfaces_good else see_surfaces(w)

@@ -26,8 +26,8 @@ def head_at(column: int64_t, row: int64_t, heads: int64_t) -> int64_t:
 @kernel
 def list_line(
     k: cython.Py_ssize_t, x: cython.double, y: cython.double, dx: cython.double, dy: cython.double, far: cython.double,
-    cell: cython.double, head: cython.pointer(int32_t), heads: int64_t, link: cython.pointer(int32_t), room: cython.Py_ssize_t,
-    used: cython.Py_ssize_t,
+    cell: cython.double, head: cython.pointer(int32_t), heads: int64_t, link: cython.pointer(int32_t),
+    capacity: cython.Py_ssize_t, used: cython.Py_ssize_t,
 ) -> cython.Py_ssize_t:  # fmt: skip
     """List segment k, from (x, y) by (dx, dy), in all cells within `far` m; returns the number of links in use, -1: too few."""
     first: int64_t = cython.cast(int64_t, floor((min(y, y + dy) - far) / cell))
@@ -42,7 +42,7 @@ def list_line(
         left: int64_t = cython.cast(int64_t, floor((min(x + s0 * dx, x + s1 * dx) - far) / cell))
         right: int64_t = cython.cast(int64_t, floor((max(x + s0 * dx, x + s1 * dx) + far) / cell))
         for column in range(left, right + 1):
-            if used == room:
+            if used == capacity:
                 return -1
             to: int64_t = head_at(column, row, heads)
             link[2 * used], link[2 * used + 1] = cython.cast(int32_t, k), head[to]

@@ -152,7 +152,7 @@ def passes(w: cython.pointer(Step), k: cython.Py_ssize_t, leg: cython.pointer(Le
 
 
 @kernel
-def meets_segment(
+def crosses_segment(
     w: cython.pointer(Step), k: cython.Py_ssize_t, faces: cython.Py_ssize_t, leg: cython.pointer(Leg)
 ) -> cython.bint:
     """`passes` for segment k, or for the polygon of so many faces that begins with it, whose inside counts."""
@@ -165,7 +165,7 @@ def meets_segment(
 
 
 @inlined
-def meet_boxes(a: cython.pointer(Box), b: cython.pointer(Box)) -> cython.bint:
+def boxes_overlap(a: cython.pointer(Box), b: cython.pointer(Box)) -> cython.bint:
     """Whether two boxes intersect."""
     return a.x0 <= b.x1 and a.x1 >= b.x0 and a.y0 <= b.y1 and a.y1 >= b.y0
 
@@ -183,12 +183,12 @@ def sense_one(
         leg: Leg = leg_of(w, i, first == 1)
         around: Box = nothing()
         widen(cython.address(around), leg.x, leg.y, leg.dx, leg.dy, leg.reach)
-        if not (meet_boxes(box, cython.address(around)) and meets_segment(w, k, faces, cython.address(leg))):
+        if not (boxes_overlap(box, cython.address(around)) and crosses_segment(w, k, faces, cython.address(leg))):
             continue
         w.sensed[place] |= bit
         if first == 0 and w.substep + 1 == w.substeps:
             leg.x, leg.y, leg.dx, leg.dy, leg.begin = leg.x + leg.dx, leg.y + leg.dy, 0.0, 0.0, leg.end
-            if meets_segment(w, k, faces, cython.address(leg)):
+            if crosses_segment(w, k, faces, cython.address(leg)):
                 w.inside[place] |= bit
 
 
@@ -214,7 +214,7 @@ def sense(w: cython.pointer(Step), block: cython.int) -> cython.void:
         if w.segment[SEGMENT * k + SENSOR] == 0 or (faces > 0 and first != k):
             continue
         box: Box = box_of(w, k, faces)
-        if meet_boxes(cython.address(box), cython.address(here)):
+        if boxes_overlap(cython.address(box), cython.address(here)):
             for i in range(a, b):
                 if accepts_segment(w, i, k):
                     sense_one(w, i, k, faces, cython.address(box))

@@ -15,7 +15,7 @@ def sources_hash() -> str:
     """The hash as 16 hex digits."""
     root = Path(__file__).resolve().parents[1]
     digest = hashlib.blake2b(digest_size=8)
-    for path in (root / "ground" / "constants.py", *sorted((root / "core").glob("*.*"))):
+    for path in (root / "common" / "constants.py", *sorted((root / "core").glob("*.*"))):
         if path.suffix in _KINDS:
             digest.update(path.relative_to(root).as_posix().encode())
             digest.update(path.read_bytes())

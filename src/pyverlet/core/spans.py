@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 import cython
-from cython.cimports.team import team_clock, team_told, thread_team
+from cython.cimports.team import team_clock, team_spent, thread_team
 
 from pyverlet.core.kernels import kernel
 
@@ -35,11 +35,11 @@ def spans_of(team: cython.pointer(thread_team)):
     """name: (seconds, active threads) since the last call."""
     spent: cython.double = 0
     k: cython.int
-    told = {}
+    found = {}
     if not team.timed:
-        return told
+        return found
     for k in range(NOTES + 1):
-        threads: cython.int = team_told(team, k, cython.address(spent))
+        threads: cython.int = team_spent(team, k, cython.address(spent))
         if spent > 0:
-            told[NAMES[k]] = spent, threads
-    return told
+            found[NAMES[k]] = spent, threads
+    return found

@@ -14,6 +14,7 @@ from pyverlet.core.surface_passing import passes_by
 from pyverlet.core.surface_rows import (
     BEND,
     CONTACT,
+    COULOMB,
     DRAG,
     FARAWAY,
     GAP,
@@ -21,7 +22,6 @@ from pyverlet.core.surface_rows import (
     PUSH,
     ROLL,
     ROLL_MOST,
-    RUB,
     RUNS,
     SEEN,
     SIDES,
@@ -35,9 +35,9 @@ from pyverlet.core.surfaces import (
     is_slow,
     length,
     most_speed,
-    note_clear,
     push_off,
     stays_off,
+    update_clear,
     way_from,
 )
 
@@ -101,9 +101,9 @@ def turn_by(w: cython.pointer(Step), i: cython.Py_ssize_t, roll: cython.double) 
 
 @inlined
 def hold_roll(
-    w: cython.pointer(Step), i: cython.Py_ssize_t, first: cython.Py_ssize_t, after: cython.double, rubbed: cython.double
+    w: cython.pointer(Step), i: cython.Py_ssize_t, first: cython.Py_ssize_t, after: cython.double, tangent: cython.double
 ) -> cython.void:
-    """Rolling resistance: stop the disc's rolling on the surface within its limit; friction is about to give `rubbed`."""
+    """Rolling resistance: stop the disc's rolling on the surface within its limit; friction is about to give `tangent`."""
     row: cython.pointer(cython.double) = w.contact
     r: cython.double = w.radius[i]
     ease: cython.double = w.ease[w.mixed * i]
@@ -111,7 +111,7 @@ def hold_roll(
         return
     most: cython.double = row[first + ROLL_MOST] * after
     had: cython.double = row[first + ROLL]
-    spin: cython.double = w.motion[4 * i + 2] - row[first + SPIN] - ease * rubbed / r
+    spin: cython.double = w.motion[4 * i + 2] - row[first + SPIN] - ease * tangent / r
     row[first + ROLL] = min(max(had - r * r * spin / ease, -most), most)
     turn_by(w, i, row[first + ROLL] - had)
 
@@ -119,11 +119,11 @@ def hold_roll(
 @inlined
 def hold(
     w: cython.pointer(Step), i: cython.Py_ssize_t, k: cython.Py_ssize_t, relax: cython.bint, leak: cython.double,
-    rubs: cython.bint,
+    has_friction: cython.bint,
 ) -> cython.double:  # fmt: skip
     """Update a resting contact: the impulse that lets the rim just reach the surface within this substep.
 
-    leak: fraction of the impulse as a speed at which the rim may enter the surface. rubs: with friction.
+    leak: fraction of the impulse as a speed at which the rim may enter the surface. has_friction: with friction.
 
     Returns the absolute change of the impulse.
     """
@@ -152,21 +152,21 @@ def hold(
     row[first + PUSH] = after
     if after == 0:
         w.clear[3 * w.contact_begin[i] + 2] = 0
-    rubbed: cython.double = 0.0
-    if rubs:
+    tangent: cython.double = 0.0
+    if has_friction:
         ux -= (after - before) * nx
         uy -= (after - before) * ny
         slip: cython.double = ux * ny - uy * nx - v[4 * i + 2] * w.radius[i]
-        most: cython.double = row[first + RUB] * after
+        most: cython.double = row[first + COULOMB] * after
         old: cython.double = row[first + DRAG]
         ease: cython.double = w.ease[w.mixed * i]
         row[first + DRAG] = min(max(old - slip * (1 / (1 + ease)), -most), most)  # off the critical path
-        rubbed = row[first + DRAG] - old
+        tangent = row[first + DRAG] - old
         if w.rolls:
-            hold_roll(w, i, first, after, rubbed)
+            hold_roll(w, i, first, after, tangent)
     if w.surface[k] < 0:
         keep_with_pair(w, k)
-    push_off(w, i, k, after - before, rubbed, nx, ny)
+    push_off(w, i, k, after - before, tangent, nx, ny)
     return fabs(after - before)
 
 
@@ -202,8 +202,8 @@ def hold_two(
 
 
 @inlined
-def turns_away(w: cython.pointer(Step), i: cython.Py_ssize_t, k: cython.Py_ssize_t, rubbed: cython.double) -> cython.bint:
-    """Whether friction `rubbed` has changed the correction for a surface's curvature noticeably: s² h / 2 R.
+def turns_away(w: cython.pointer(Step), i: cython.Py_ssize_t, k: cython.Py_ssize_t, tangent: cython.double) -> cython.bint:
+    """Whether friction `tangent` has changed the correction for a surface's curvature noticeably: s² h / 2 R.
 
     Buckled chains amplify what is left, so with links every curvature counts.
     """
@@ -215,13 +215,13 @@ def turns_away(w: cython.pointer(Step), i: cython.Py_ssize_t, k: cython.Py_ssize
     v: cython.pointer(real) = w.motion if w.rough else w.velocity
     x: cython.double = v[width * i] - row[first + SPEED] + row[first + RUNS] * row[first + NORMAL + 1]
     y: cython.double = v[width * i + 1] - row[first + SPEED + 1] - row[first + RUNS] * row[first + NORMAL]
-    change: cython.double = (fabs(x) + fabs(y) + 0.5 * fabs(rubbed)) * fabs(rubbed) * w.h * fabs(row[first + BEND])
+    change: cython.double = (fabs(x) + fabs(y) + 0.5 * fabs(tangent)) * fabs(tangent) * w.h * fabs(row[first + BEND])
     return change > SETTLED * row[first + PUSH] or w.linked
 
 
 @kernel
 def hold_all(
-    w: cython.pointer(Step), i: cython.Py_ssize_t, rubs: cython.bint, came_x: cython.double, came_y: cython.double,
+    w: cython.pointer(Step), i: cython.Py_ssize_t, has_friction: cython.bint, came_x: cython.double, came_y: cython.double,
     far: cython.double,
 ) -> cython.bint:  # fmt: skip
     """Sweep over surfaces that are nearer than `far` or loaded, until none changes; came: velocity before the first sweep.
@@ -246,11 +246,11 @@ def hold_all(
         for k in range(w.contact_begin[i], w.contact_end[i]):
             if w.contact[CONTACT * k + GAP] < far or w.contact[CONTACT * k + PUSH] > 0:
                 drag: cython.double = w.contact[CONTACT * k + DRAG]
-                change = max(change, hold(w, i, k, False, 0, rubs))
+                change = max(change, hold(w, i, k, False, 0, has_friction))
                 most = max(most, w.contact[CONTACT * k + PUSH])
                 if w.contact[CONTACT * k + PUSH] > 0:
                     loaded += 1
-                    bends |= rubs and turns_away(w, i, k, w.contact[CONTACT * k + DRAG] - drag)
+                    bends |= has_friction and turns_away(w, i, k, w.contact[CONTACT * k + DRAG] - drag)
                     if loaded == 2 and turn % TOGETHER == 8:
                         hold_two(w, i, one, k, most_speed(w, i, came_x, came_y) + faster)
                     one = k
@@ -267,7 +267,7 @@ def hold_all(
 
 
 @inlined
-def take_back(w: cython.pointer(Step), i: cython.Py_ssize_t, k: cython.Py_ssize_t, push: cython.double) -> cython.void:
+def undo_push(w: cython.pointer(Step), i: cython.Py_ssize_t, k: cython.Py_ssize_t, push: cython.double) -> cython.void:
     """Undo friction and rolling resistance of a contact in this substep, and the given part of its push."""
     first: cython.Py_ssize_t = CONTACT * k
     if push == 0 and w.contact[first + DRAG] == 0 and w.contact[first + ROLL] == 0:
@@ -311,7 +311,7 @@ def forget_jam(w: cython.pointer(Step), i: cython.Py_ssize_t) -> cython.void:
     if fast == 0 or excess <= MOST_FASTER * fast or 2 * length(x, y) > pushes:
         return
     for k in range(w.contact_begin[i], w.contact_end[i]):
-        take_back(w, i, k, w.contact[CONTACT * k + PUSH])
+        undo_push(w, i, k, w.contact[CONTACT * k + PUSH])
 
 
 @kernel
@@ -334,7 +334,7 @@ def hold_surfaces(w: cython.pointer(Step), i: cython.Py_ssize_t, clear: cython.b
         elif not (loaded and unmoved and w.surface[k] >= 0):
             measure_surface(w, i, k, False)
     if not clear:
-        note_clear(w, i)
+        update_clear(w, i)
     elif loads == 0:
         return
     width: cython.Py_ssize_t = 4 if w.rough else 2
@@ -344,7 +344,7 @@ def hold_surfaces(w: cython.pointer(Step), i: cython.Py_ssize_t, clear: cython.b
     if hold_all(w, i, w.rough, x, y, far):
         return
     for k in range(w.contact_begin[i], w.contact_end[i]):
-        take_back(w, i, k, 0)
+        undo_push(w, i, k, 0)
     if not (w.rough and hold_all(w, i, False, x, y, far)):
         squeeze(w, i, far)
 

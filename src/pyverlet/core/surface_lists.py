@@ -22,11 +22,11 @@ from pyverlet.core.step import BOX, CAGE, NEAR, Step
 from pyverlet.core.surface_rows import (
     CONTACT,
     DRAG,
+    EVENT,
+    EVENT_BOUNCES,
+    EVENT_IMPULSE,
+    EVENT_SPEED,
     FARAWAY,
-    HEARD,
-    HEARD_BOUNCES,
-    HEARD_PUSH,
-    HEARD_SPEED,
     HELD,
     PUSH,
     ROLL,
@@ -57,7 +57,7 @@ def near_side(w: cython.pointer(Step), i: cython.Py_ssize_t, side: cython.int, f
     x: cython.double = w.position[2 * i]
     y: cython.double = w.position[2 * i + 1]
     far += w.radius[i]
-    if w.room == CAGE:
+    if w.boundary == CAGE:
         x -= w.x0
         y -= w.y0
         return side == 0 and (w.x1 <= far or x * x + y * y > (w.x1 - far) * (w.x1 - far))
@@ -138,7 +138,7 @@ def see(w: cython.pointer(Step), i: cython.Py_ssize_t, begin: cython.Py_ssize_t,
             w.surface[begin] = -1 - pair
         end += 1
         pair = w.lists.kept_next[INDEX_WORDS * pair]
-    if (w.room == BOX or w.room == CAGE) and accepts(w, i, w.wall_category, w.wall_mask):
+    if (w.boundary == BOX or w.boundary == CAGE) and accepts(w, i, w.wall_category, w.wall_mask):
         for side in range(4):
             if near_side(w, i, side, far):
                 end = put_surface(w, begin, end, side) if fill else end + 1
@@ -207,8 +207,8 @@ def fill_surfaces_stage(what: cython.p_void, block: cython.int) -> cython.void:
             w.contact[CONTACT * k + PUSH] = w.contact[CONTACT * k + DRAG] = w.contact[CONTACT * k + ROLL] = 0
             w.contact[CONTACT * k + HELD] = 0
             w.contact[CONTACT * k + SEEN] = FARAWAY  # not measured yet
-            w.contact[CONTACT * k + HEARD_SPEED] = w.contact[CONTACT * k + HEARD_BOUNCES] = w.contact[CONTACT * k + HEARD] = 0
-            w.contact[CONTACT * k + HEARD_PUSH] = 0
+            w.contact[CONTACT * k + EVENT_SPEED] = w.contact[CONTACT * k + EVENT_BOUNCES] = w.contact[CONTACT * k + EVENT] = 0
+            w.contact[CONTACT * k + EVENT_IMPULSE] = 0
             if w.surface[k] < 0:
                 w.contact[CONTACT * k + PUSH] = w.impulse[pinned_lane(w, k)]
                 w.contact[CONTACT * k + DRAG] = -w.tangent_impulse[pinned_lane(w, k)] if w.rough else 0
@@ -262,7 +262,7 @@ def list_surfaces(w: cython.pointer(Step)) -> cython.bint:
         here: int64_t = w.contact_count[block]
         w.contact_count[block] = total
         total += here
-    if total > w.contact_room:
+    if total > w.contact_capacity:
         w.contact_count[0] = total
         return False
     team_stage(w.team, fill_surfaces_stage, w, blocks)

@@ -7,7 +7,7 @@ import cython
 from cython.cimports.lanes import real
 from cython.cimports.libc.stdint import int64_t
 
-from pyverlet.core.hearing import least_bounce
+from pyverlet.core.event_recording import least_bounce
 from pyverlet.core.kernels import inlined, kernel
 from pyverlet.core.obstacles import LATE, SEGMENT
 from pyverlet.core.step import Step

@@ -27,13 +27,13 @@ GAP = cython.declare(cython.int, 2)  # m
 BEND = cython.declare(cython.int, 3)  # curvature, 1/m; positive: towards the particle, as for a cage
 SPEED = cython.declare(cython.int, 4)  # (2) m/s
 BOUNCE = cython.declare(cython.int, 6)
-RUB = cython.declare(cython.int, 7)
+COULOMB = cython.declare(cython.int, 7)
 PUSH = cython.declare(cython.int, 8)  # normal and tangential impulse over the mass, m/s
 DRAG = cython.declare(cython.int, 9)
 ROLL = cython.declare(cython.int, 10)  # angular impulse of rolling resistance over the mass, m^2/s
-HEARD_SPEED = cython.declare(cython.int, 11)  # as in `Step`, for this frame, while `listening`
-HEARD_BOUNCES = cython.declare(cython.int, 12)
-HEARD = cython.declare(cython.int, 13)
+EVENT_SPEED = cython.declare(cython.int, 11)  # as in `Step`, for this frame, while `records_events`
+EVENT_BOUNCES = cython.declare(cython.int, 12)
+EVENT = cython.declare(cython.int, 13)
 BEFORE_CHAIN = cython.declare(cython.int, 14)  # (2) PUSH and DRAG before a chain was solved
 ROLL_MOST = cython.declare(cython.int, 16)  # its limit over PUSH: coefficient times radius, m
 SPIN = cython.declare(cython.int, 17)  # of the surface, rad/s
@@ -41,7 +41,7 @@ HELD = cython.declare(cython.int, 18)  # by a one-way line: 1; -1: lets it pass;
 AWAY = cython.declare(cython.int, 19)  # least distance from the rim, m; 0: the surface moves, or may
 SEEN = cython.declare(cython.int, 20)  # (2) position of the particle then
 RUNS = cython.declare(cython.int, 22)  # part of SPEED along (n_y, -n_x) by a belt or rotating rim
-HEARD_PUSH = cython.declare(cython.int, 23)  # impulse in this frame, m/s, while `listening`
+EVENT_IMPULSE = cython.declare(cython.int, 23)  # impulse in this frame, m/s, while `records_events`
 
 GIVEN = cython.declare(cython.int, 4)
 """Columns of `Step.by_surface`: a velocity (2), and its parts out of the surface and along (n_y, -n_x), m/s."""
@@ -79,7 +79,7 @@ def mix(
     if w.materials > 0:
         a: cython.Py_ssize_t = w.own_material[w.mixed * i]
         e, mu, c = together(w, a, material, 0, e), together(w, a, material, 1, mu), together(w, a, material, 2, c)
-    w.contact[first + BOUNCE], w.contact[first + RUB], w.contact[first + ROLL_MOST] = e, mu, c * w.radius[i]
+    w.contact[first + BOUNCE], w.contact[first + COULOMB], w.contact[first + ROLL_MOST] = e, mu, c * w.radius[i]
 
 
 @kernel
@@ -92,7 +92,7 @@ def measure_side(w: cython.pointer(Step), i: cython.Py_ssize_t, k: cython.Py_ssi
     y: cython.double = w.position[2 * i + 1]
     r: cython.double = w.radius[i]
     row[first + SPEED] = row[first + SPEED + 1] = row[first + BEND] = row[first + SPIN] = row[first + RUNS] = 0.0
-    if w.room == CAGE:
+    if w.boundary == CAGE:
         x -= w.x0
         y -= w.y0
         d: cython.double = sqrt(x * x + y * y)
@@ -175,7 +175,7 @@ def measure_pinned(w: cython.pointer(Step), i: cython.Py_ssize_t, k: cython.Py_s
     turn: cython.double = w.motion[4 * j + 2] * cython.cast(cython.double, w.radius[j]) if w.rough else 0.0
     row[first + SPEED], row[first + SPEED + 1] = v[width * j] + turn * ny, v[width * j + 1] - turn * nx
     row[first + RUNS] = turn
-    row[first + BOUNCE], row[first + RUB] = w.restitution[lane * w.mixed], w.friction[lane * w.mixed]
+    row[first + BOUNCE], row[first + COULOMB] = w.restitution[lane * w.mixed], w.friction[lane * w.mixed]
     row[first + ROLL_MOST], row[first + SPIN] = w.rolling[lane * w.mixed], w.motion[4 * j + 2] if w.rough else 0.0
     w.normal_x[lane], w.normal_y[lane] = cython.cast(real, sign * nx), cython.cast(real, sign * ny)
     w.depth[lane] = cython.cast(real, reach - distance)

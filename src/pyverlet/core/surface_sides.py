@@ -22,7 +22,7 @@ from pyverlet.core.periodic import wrapped
 from pyverlet.core.segments import head_at
 from pyverlet.core.step import CAGE, OPEN, Step
 from pyverlet.core.surface_rows import is_one_way
-from pyverlet.core.work import book_place
+from pyverlet.core.work import add_place_work
 
 Way = cython.struct(x=cython.double, y=cython.double, dx=cython.double, dy=cython.double)
 """The path of a particle in a substep: start and displacement, m."""
@@ -93,19 +93,19 @@ def move_to(w: cython.pointer(Step), i: cython.Py_ssize_t, x: cython.double, y: 
     w.position[2 * i + 1] += cython.cast(real, dy)
     w.moved[2 * i] += cython.cast(real, dx)
     w.moved[2 * i + 1] += cython.cast(real, dy)
-    if w.booking:
-        book_place(w, i, dx, dy)
+    if w.records_work:
+        add_place_work(w, i, dx, dy)
 
 
 @kernel
-def inside_room(w: cython.pointer(Step), i: cython.Py_ssize_t, x: cython.double, y: cython.double) -> Way:
+def inside_boundary(w: cython.pointer(Step), i: cython.Py_ssize_t, x: cython.double, y: cython.double) -> Way:
     """The position of particle i inside the room nearest to (x, y), and the vector from there to (x, y)."""
     way: Way
     way.x, way.y, way.dx, way.dy = x, y, 0.0, 0.0
-    if w.room == OPEN or not accepts(w, i, w.wall_category, w.wall_mask):
+    if w.boundary == OPEN or not accepts(w, i, w.wall_category, w.wall_mask):
         return way
     r: cython.double = w.radius[i]
-    if w.room == CAGE:
+    if w.boundary == CAGE:
         d: cython.double = sqrt((x - w.x0) * (x - w.x0) + (y - w.y0) * (y - w.y0))
         part: cython.double = min((w.x1 - r) / d, 1.0) if d > 0 else 1.0
         way.x, way.y = w.x0 + part * (x - w.x0), w.y0 + part * (y - w.y0)
@@ -150,7 +150,7 @@ def keep_side(w: cython.pointer(Step), i: cython.Py_ssize_t) -> cython.void:
         w.free[2 * i + 1] -= cython.cast(real, rate * c)
     rest: cython.double = (1 - part) * h
     # The room takes precedence: a moving line passes over particles between it and the wall.
-    to: Way = inside_room(w, i, from_x + part * way.dx + rest * w.body[b + 3], from_y + part * way.dy + rest * w.body[b + 4])
+    to: Way = inside_boundary(w, i, from_x + part * way.dx + rest * w.body[b + 3], from_y + part * way.dy + rest * w.body[b + 4])
     move_to(w, i, to.x, to.y)
 
 
@@ -204,7 +204,7 @@ def keep_inside(w: cython.pointer(Step), i: cython.Py_ssize_t, least: cython.dou
     h: cython.double = w.h
     x: cython.double = w.position[2 * i] + v[width * i] * h
     y: cython.double = w.position[2 * i + 1] + v[width * i + 1] * h
-    way: Way = inside_room(w, i, x, y)
+    way: Way = inside_boundary(w, i, x, y)
     beyond: cython.double = sqrt(way.dx * way.dx + way.dy * way.dy)
     if beyond == 0 or beyond < least * w.radius[i] or w.inverse_mass[i] == 0:
         return
@@ -212,7 +212,7 @@ def keep_inside(w: cython.pointer(Step), i: cython.Py_ssize_t, least: cython.dou
     ny: cython.double = way.dy / beyond
     out: cython.double = max(v[width * i] * nx + v[width * i + 1] * ny, 0.0)
     strike(w, i, -out * nx, -out * ny, 0, 0)
-    if w.noting:
+    if w.records_contacts:
         w.wall_given[2 * i] -= cython.cast(real, out * nx)
         w.wall_given[2 * i + 1] -= cython.cast(real, out * ny)
     move_to(w, i, way.x, way.y)

@@ -72,7 +72,7 @@ def round_time(
 
 
 @kernel
-def meet_round(
+def time_to_round(
     x: cython.double, y: cython.double, ux: cython.double, uy: cython.double, ax: cython.double, ay: cython.double,
     reach: cython.double, h: cython.double, since: cython.double, out: cython.bint,
 ) -> Hit:  # fmt: skip
@@ -91,7 +91,7 @@ def meet_round(
 
 
 @kernel
-def meet_side(w: cython.pointer(Step), i: cython.Py_ssize_t, k: cython.Py_ssize_t, since: cython.double) -> Hit:
+def time_to_side(w: cython.pointer(Step), i: cython.Py_ssize_t, k: cython.Py_ssize_t, since: cython.double) -> Hit:
     """When particle i hits the side of contact k."""
     hit: Hit
     row: cython.pointer(cython.double) = w.contact
@@ -102,17 +102,17 @@ def meet_side(w: cython.pointer(Step), i: cython.Py_ssize_t, k: cython.Py_ssize_
     uy: cython.double = v[width * i + 1]
     ax: cython.double = w.acceleration[2 * i]
     ay: cython.double = w.acceleration[2 * i + 1]
-    if w.room == CAGE:
+    if w.boundary == CAGE:
         x: cython.double = w.position[2 * i] - w.x0
         y: cython.double = w.position[2 * i + 1] - w.y0
-        return meet_round(x, y, ux, uy, ax, ay, w.x1 - w.radius[i], w.h, since, True)
+        return time_to_round(x, y, ux, uy, ax, ay, w.x1 - w.radius[i], w.h, since, True)
     hit.nx, hit.ny = row[first + NORMAL], row[first + NORMAL + 1]
     hit.time = flat_time(row[first + GAP], ux * hit.nx + uy * hit.ny, ax * hit.nx + ay * hit.ny, w.h, since)
     return hit
 
 
 @kernel
-def meet_pinned(w: cython.pointer(Step), i: cython.Py_ssize_t, k: cython.Py_ssize_t, since: cython.double) -> Hit:
+def time_to_pinned(w: cython.pointer(Step), i: cython.Py_ssize_t, k: cython.Py_ssize_t, since: cython.double) -> Hit:
     """When particle i hits the pinned circle of contact k."""
     row: cython.pointer(cython.double) = w.contact
     first: cython.Py_ssize_t = CONTACT * k
@@ -126,11 +126,11 @@ def meet_pinned(w: cython.pointer(Step), i: cython.Py_ssize_t, k: cython.Py_ssiz
     uy: cython.double = v[width * i + 1] - cython.cast(cython.double, v[width * j + 1])
     x: cython.double = -d * row[first + NORMAL]
     y: cython.double = -d * row[first + NORMAL + 1]
-    return meet_round(x, y, ux, uy, w.acceleration[2 * i], w.acceleration[2 * i + 1], reach, w.h, since, False)
+    return time_to_round(x, y, ux, uy, w.acceleration[2 * i], w.acceleration[2 * i + 1], reach, w.h, since, False)
 
 
 @kernel
-def meet_segment(w: cython.pointer(Step), i: cython.Py_ssize_t, k: cython.Py_ssize_t, since: cython.double) -> Hit:
+def time_to_segment(w: cython.pointer(Step), i: cython.Py_ssize_t, k: cython.Py_ssize_t, since: cython.double) -> Hit:
     """When particle i hits the segment of contact k: its face, or an end."""
     hit: Hit
     row: cython.pointer(cython.double) = w.contact
@@ -160,7 +160,7 @@ def meet_segment(w: cython.pointer(Step), i: cython.Py_ssize_t, k: cython.Py_ssi
     for end in range(1 if p.length == 0 else 2):
         if end == 1 and (w.segment[at + AFTER] != 0 or w.segment[at + AFTER + 1] != 0):
             continue  # belongs to the segment that starts there
-        about: Hit = meet_round(p.x - p.length * end, p.y, f.ux, f.uy, f.ax, f.ay, p.reach, h, soonest, False)
+        about: Hit = time_to_round(p.x - p.length * end, p.y, f.ux, f.uy, f.ax, f.ay, p.reach, h, soonest, False)
         if about.time < hit.time:
             outside: cython.bint = p.length == 0 or (about.nx <= 0 if end == 1 else about.nx >= 0)
             if outside and (end == 1 or not about.nx * w.segment[at + BEFORE] + about.ny * w.segment[at + BEFORE + 1] < 0):
@@ -177,13 +177,13 @@ def meet_segment(w: cython.pointer(Step), i: cython.Py_ssize_t, k: cython.Py_ssi
 
 
 @kernel
-def meet_surface(w: cython.pointer(Step), i: cython.Py_ssize_t, k: cython.Py_ssize_t, since: cython.double) -> Hit:
+def time_to_surface(w: cython.pointer(Step), i: cython.Py_ssize_t, k: cython.Py_ssize_t, since: cython.double) -> Hit:
     """When particle i hits the surface of contact k, NEVER if not in this substep; and the normal there. Not before `since`."""
     if w.surface[k] < 0:
-        return meet_pinned(w, i, k, since)
+        return time_to_pinned(w, i, k, since)
     if w.surface[k] < SIDES:
-        return meet_side(w, i, k, since)
-    return meet_segment(w, i, k, since)
+        return time_to_side(w, i, k, since)
+    return time_to_segment(w, i, k, since)
 
 
 @kernel

@@ -7,27 +7,27 @@ import cython
 from cython.cimports.lanes import real
 from cython.cimports.libc.math import fabs, sqrt
 
-from pyverlet.core.hearing import hear_pair, hear_surface, least_bounce
+from pyverlet.core.event_recording import least_bounce, record_pair, record_surface
 from pyverlet.core.impacts import NEVER, strike
 from pyverlet.core.kernels import inlined, kernel
-from pyverlet.core.rebounds import REBOUND, VOLLEY, node_of, note_rebound
+from pyverlet.core.rebounds import REBOUND, STAMP, node_of, store_rebound
 from pyverlet.core.step import Step
 from pyverlet.core.surface_rows import (
     AWAY,
     BOUNCE,
     CONTACT,
+    COULOMB,
     FARAWAY,
     GAP,
     GIVEN,
     PUSH,
-    RUB,
     SEEN,
     SPEED,
     pinned_lane,
 )
 from pyverlet.core.surface_shapes import measure_surface
-from pyverlet.core.surface_times import Hit, meet_surface, set_speed
-from pyverlet.core.work import book_belt, book_place
+from pyverlet.core.surface_times import Hit, set_speed, time_to_surface
+from pyverlet.core.work import add_belt_work, add_place_work
 
 MOST_BOUNCES = cython.declare(cython.int, 256)
 """Most consecutive bounces of one particle per substep."""
@@ -81,7 +81,7 @@ def most_speed(w: cython.pointer(Step), i: cython.Py_ssize_t, x: cython.double, 
 
 
 @inlined
-def note_surface(
+def add_surface_impulse(
     w: cython.pointer(Step), i: cython.Py_ssize_t, k: cython.Py_ssize_t, jn: cython.double, jt: cython.double, nx: cython.double,
     ny: cython.double, struck: cython.bint,
 ) -> cython.void:  # fmt: skip
@@ -89,7 +89,7 @@ def note_surface(
 
     Impulses of pinned circles are recorded by their pairs.
     """
-    if not w.noting:
+    if not w.records_contacts:
         return
     dx: cython.double = jt * ny - jn * nx
     dy: cython.double = -jt * nx - jn * ny
@@ -97,9 +97,9 @@ def note_surface(
         if struck:
             lane: cython.Py_ssize_t = pinned_lane(w, k)
             sign: cython.double = -1.0 if cython.cast(cython.Py_ssize_t, w.i[lane]) == i else 1.0
-            w.noted_x[lane] += cython.cast(real, sign * dx)
-            w.noted_y[lane] += cython.cast(real, sign * dy)
-            w.noted_virial[lane] += cython.cast(real, jn * w.reach[lane * w.sized])
+            w.summed_x[lane] += cython.cast(real, sign * dx)
+            w.summed_y[lane] += cython.cast(real, sign * dy)
+            w.summed_virial[lane] += cython.cast(real, jn * w.reach[lane * w.sized])
     else:
         given: cython.pointer(cython.double) = w.by_surface
         given[GIVEN * k] += dx
@@ -118,7 +118,7 @@ def push_off(
     v: cython.pointer(real) = w.motion if w.rough else w.velocity
     v[width * i] += cython.cast(real, jt * ny - jn * nx)
     v[width * i + 1] -= cython.cast(real, jt * nx + jn * ny)
-    note_surface(w, i, k, w.weigh * jn, w.weigh * jt, nx, ny, False)
+    add_surface_impulse(w, i, k, w.rest_scale * jn, w.rest_scale * jt, nx, ny, False)
     if w.rough:
         ease: cython.double = w.ease[w.mixed * i]
         v[4 * i + 2] -= cython.cast(real, jt * (ease / w.radius[i]))
@@ -139,41 +139,41 @@ def bounce_at(w: cython.pointer(Step), i: cython.Py_ssize_t, k: cython.Py_ssize_
     speed: cython.double = ux * nx + uy * ny
     given: cython.double = (1 + row[first + BOUNCE]) * speed
     strike(w, i, -given * nx, -given * ny, 0, hit.time)
-    note_surface(w, i, k, given, 0, nx, ny, True)
+    add_surface_impulse(w, i, k, given, 0, nx, ny, True)
     if w.surface[k] < 0:
-        hear_pair(w, pinned_lane(w, k), speed, row[first + BOUNCE] * speed)
+        record_pair(w, pinned_lane(w, k), speed, row[first + BOUNCE] * speed)
     else:
-        hear_surface(w, i, k, speed, row[first + BOUNCE] * speed)
-    mu: cython.double = row[first + RUB]
+        record_surface(w, i, k, speed, row[first + BOUNCE] * speed)
+    mu: cython.double = row[first + COULOMB]
     if w.rough and mu > 0:
         slip: cython.double = ux * ny - uy * nx - w.motion[4 * i + 2] * w.radius[i]
         most: cython.double = mu * given
         jt: cython.double = min(max(-slip / (1 + w.ease[w.mixed * i]), -most), most)
         strike(w, i, jt * ny, -jt * nx, -jt * w.ease[w.mixed * i] / w.radius[i], hit.time)
-        note_surface(w, i, k, 0, jt, nx, ny, True)
-        if w.booking:
-            book_belt(w, i, k, jt, nx, ny)
+        add_surface_impulse(w, i, k, 0, jt, nx, ny, True)
+        if w.records_work:
+            add_belt_work(w, i, k, jt, nx, ny)
     if w.linked and row[first + BOUNCE] > 0 and node_of(w, i) >= 0:
         left: cython.double = -v[width * i] * nx - v[width * i + 1] * ny
-        note_rebound(w, w.surface_rebound, REBOUND * k, -nx, -ny, left, given, row[first + BOUNCE], hit.time)
+        store_rebound(w, w.surface_rebound, REBOUND * k, -nx, -ny, left, given, row[first + BOUNCE], hit.time)
     gap: cython.double = row[first + GAP]
     if hit.time == 0 and gap < 0:  # it was beyond the surface
         w.position[2 * i] += cython.cast(real, gap * nx)
         w.position[2 * i + 1] += cython.cast(real, gap * ny)
         w.moved[2 * i] += cython.cast(real, gap * nx)
         w.moved[2 * i + 1] += cython.cast(real, gap * ny)
-        if w.booking:
-            book_place(w, i, gap * nx, gap * ny)
+        if w.records_work:
+            add_place_work(w, i, gap * nx, gap * ny)
 
 
 @kernel
-def meets(w: cython.pointer(Step), i: cython.Py_ssize_t, k: cython.Py_ssize_t, since: cython.double) -> Hit:
+def impact_with(w: cython.pointer(Step), i: cython.Py_ssize_t, k: cython.Py_ssize_t, since: cython.double) -> Hit:
     """When particle i hits the surface of contact k faster than resting contacts do; NEVER: not in this substep."""
     row: cython.pointer(cython.double) = w.contact
     first: cython.Py_ssize_t = CONTACT * k
     width: cython.Py_ssize_t = 4 if w.rough else 2
     v: cython.pointer(real) = w.motion if w.rough else w.velocity
-    hit: Hit = meet_surface(w, i, k, since)
+    hit: Hit = time_to_surface(w, i, k, since)
     if hit.time == NEVER:
         return hit
     set_speed(w, i, k, cython.address(hit))
@@ -196,7 +196,7 @@ def has_rebounds(w: cython.pointer(Step), i: cython.Py_ssize_t) -> cython.bint:
     found: cython.bint = False
     if node_of(w, i) >= 0:
         for k in range(w.contact_begin[i], w.contact_end[i]):
-            found |= w.surface_rebound[REBOUND * k + VOLLEY] == w.volley
+            found |= w.surface_rebound[REBOUND * k + STAMP] == w.stamp
     return found
 
 
@@ -233,7 +233,7 @@ def stays_off(w: cython.pointer(Step), i: cython.Py_ssize_t, k: cython.Py_ssize_
 
 
 @inlined
-def note_clear(w: cython.pointer(Step), i: cython.Py_ssize_t) -> cython.void:
+def update_clear(w: cython.pointer(Step), i: cython.Py_ssize_t) -> cython.void:
     """Store the distance of particle i from surfaces that do not carry it, as measured now."""
     k: cython.Py_ssize_t
     least: cython.double = FARAWAY
@@ -280,7 +280,7 @@ def bounce_surfaces(w: cython.pointer(Step), i: cython.Py_ssize_t) -> cython.bin
         for k in range(w.contact_begin[i], w.contact_end[i]):
             if not (supports(w, i, k) or stays_off(w, i, k, ahead)):
                 measure_surface(w, i, k, False)
-                hit: Hit = meets(w, i, k, w.since[i])
+                hit: Hit = impact_with(w, i, k, w.since[i])
                 if hit.time < first.time:
                     first, which = hit, k
         if which < 0:

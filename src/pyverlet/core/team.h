@@ -177,7 +177,7 @@ static inline void team_enter(thread_team *t, int span) {
 }
 
 /* Threads that have worked in a span since the last call, and its time, s. */
-static inline int team_told(thread_team *t, int span, double *spent) {
+static inline int team_spent(thread_team *t, int span, double *spent) {
     int threads = 0;
     for (int part = 0; part < t->threads; part++) {
         threads += t->share[part].worked >> span & 1;
@@ -189,7 +189,7 @@ static inline int team_told(thread_team *t, int span, double *spent) {
 }
 
 /* Called by the thread that runs the frame: have function(argument, item) called for each item up to `items`, at most TEAM_ITEMS, by
-   whoever of the team is there, or by this thread if there is no team. Returns when all are done, even if a thread is late: the others
+   the threads of the team that are free, or by this thread if there is no team. Returns when all are done, even if a thread is late: the others
    take its items. */
 static inline void team_stage(thread_team *t, team_function function, void *argument, int items) {
     int parts = !t || items < t->parts ? items : t->parts;
@@ -201,7 +201,7 @@ static inline void team_stage(thread_team *t, team_function function, void *argu
         return;
     }
     unsigned stage = atomic_load_explicit(&t->stage, memory_order_relaxed) + 1;
-    t->function = function; /* all shares of the last stage are claimed: nobody reads these now */
+    t->function = function; /* all shares of the last stage are claimed: these are not read now */
     t->argument = argument;
     atomic_store_explicit(&t->left, items, memory_order_relaxed);
     for (int part = 0; part < t->parts; part++) {

@@ -16,6 +16,6 @@ cdef extern from "team.h" nogil:
     long long team_reserved(thread_team *team)
     void team_reserve_from(thread_team *team, long long place)
     void team_enter(thread_team *team, int span)
-    int team_told(thread_team *team, int span, double *spent)
+    int team_spent(thread_team *team, int span, double *spent)
     double team_clock()
     void team_free(thread_team *team)

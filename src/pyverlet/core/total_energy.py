@@ -106,8 +106,8 @@ def sum_of_blocks(
     total: cython.double = 0.0
     if blocks == 1:
         return block_energy(b.x, b.v, b.a, b.lag, b.spin, b.radius, b.mass, b.gx, b.gy, 0, b.count)
-    room = np.empty(blocks)
-    b.sums = doubles(room)
+    partial = np.empty(blocks)
+    b.sums = doubles(partial)
     with cython.nogil:
         by_team(threads, parts, energy_stage, b, blocks)
         for block in range(blocks):

@@ -44,7 +44,7 @@ Touching = cython.struct(
     level=cython.pointer(int64_t),  # (count,) level at which each is listed, -1: none
     scale=cython.pointer(cython.double),  # (DISC_LEVELS,) inverse width of the cells, 1/m; 0 for unused levels
     highest=int64_t,
-    room=int64_t,
+    capacity=int64_t,
     pairs=cython.pointer(int64_t),
     found=int64_t,
     total=cython.double,
@@ -99,7 +99,7 @@ def is_apart(f: cython.pointer(Touching), pair: int64_t) -> cython.bint:
 
 
 @kernel
-def note_overlap(f: cython.pointer(Touching), i: int64_t, j: int64_t, square: cython.double) -> cython.void:
+def store_overlap(f: cython.pointer(Touching), i: int64_t, j: int64_t, square: cython.double) -> cython.void:
     """Count two discs whose squared centre distance is `square`, m^2, if they overlap and may collide."""
     pinned: cython.bint = f.mass[i] == INFINITY and f.mass[j] == INFINITY
     if pinned or not (f.category[i] & f.mask[j] and f.category[j] & f.mask[i]):
@@ -107,7 +107,7 @@ def note_overlap(f: cython.pointer(Touching), i: int64_t, j: int64_t, square: cy
     pair: int64_t = min(i, j) * f.count + max(i, j)
     if f.aparts > 0 and is_apart(f, pair):
         return
-    if f.found < f.room:
+    if f.found < f.capacity:
         f.pairs[f.found] = pair
     depth: cython.double = 1.0 - sqrt(square) / (cython.cast(cython.double, f.radius[i]) + f.radius[j])
     f.found, f.total, f.largest = f.found + 1, f.total + depth, max(f.largest, depth)
@@ -144,7 +144,7 @@ def look_around(
                 or cell_along(f.position[2 * j + 1], f.scale[level]) != row
             ):
                 continue  # a different cell with the same hash
-            note_overlap(f, i, j, dx * dx + dy * dy)
+            store_overlap(f, i, j, dx * dx + dy * dy)
 
 
 @kernel
@@ -167,7 +167,7 @@ def touching(position, radius, mass, category, mask, period_x: cython.double, pe
     f: cython.pointer(Touching) = cython.address(search)
     f.count, f.position, f.radius, f.mass = len(radius), const_reals(position), const_reals(radius), const_reals(mass)
     f.category, f.mask, f.period_x, f.period_y = const_indices(category), const_indices(mask), period_x, period_y
-    f.apart, f.aparts, f.pairs, f.room = const_integers(apart), len(apart), integers(pairs), len(pairs)
+    f.apart, f.aparts, f.pairs, f.capacity = const_integers(apart), len(apart), integers(pairs), len(pairs)
     f.size = 2
     while f.size < 2 * f.count:
         f.size *= 2

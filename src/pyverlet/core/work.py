@@ -1,5 +1,5 @@
 # mypy: ignore-errors
-"""Energy changes by contacts, for the ledger; only while `booking`.
+"""Energy changes by contacts, for the ledger; only while `records_work`.
 
 Let u_0 and u be velocities in the middle of a substep before and after contacts, and a the acceleration by forces. Contacts that
 change u before x += u h change the energy of a particle at the end of the substep, with the potential of a, by
@@ -88,7 +88,7 @@ def energy_of(w: cython.pointer(Step), block: cython.int, kinetic: cython.double
 
 
 @kernel
-def book_start(what: cython.p_void, block: cython.int) -> cython.void:
+def add_start_work(what: cython.p_void, block: cython.int) -> cython.void:
     """Book the energy before contacts."""
     w: cython.pointer(Step) = cython.cast(cython.pointer(Step), what)
     h: cython.double = w.h
@@ -96,14 +96,14 @@ def book_start(what: cython.p_void, block: cython.int) -> cython.void:
 
 
 @kernel
-def book_drift(w: cython.pointer(Step), block: cython.int) -> cython.void:
+def add_drift_work(w: cython.pointer(Step), block: cython.int) -> cython.void:
     """Book the energy between contacts before and after the drift."""
     h: cython.double = w.h
     w.gained[block] -= energy_of(w, block, 0, h)
 
 
 @kernel
-def book_end(what: cython.p_void, block: cython.int) -> cython.void:
+def add_end_work(what: cython.p_void, block: cython.int) -> cython.void:
     """Book the energy after contacts."""
     w: cython.pointer(Step) = cython.cast(cython.pointer(Step), what)
     h: cython.double = w.h
@@ -111,7 +111,7 @@ def book_end(what: cython.p_void, block: cython.int) -> cython.void:
 
 
 @kernel
-def book_place(w: cython.pointer(Step), i: cython.Py_ssize_t, dx: cython.double, dy: cython.double) -> cython.double:
+def add_place_work(w: cython.pointer(Step), i: cython.Py_ssize_t, dx: cython.double, dy: cython.double) -> cython.double:
     """Book a displacement of particle i; returns the change of its energy in `acceleration`, J."""
     if w.inverse_mass[i] == 0:
         return 0.0
@@ -121,7 +121,7 @@ def book_place(w: cython.pointer(Step), i: cython.Py_ssize_t, dx: cython.double,
 
 
 @kernel
-def book_impact(
+def add_impact_work(
     w: cython.pointer(Step), i: cython.Py_ssize_t, dx: cython.double, dy: cython.double, turn: cython.double, t: cython.double
 ) -> cython.void:
     """Book an impulse at time t that has changed the velocity of particle i by (dx, dy), and its spin unless it was normal."""
@@ -137,12 +137,12 @@ def book_impact(
         r: cython.double = w.radius[i]
         spin: cython.double = w.motion[4 * i + 2] - 0.5 * turn
         work += moment(w, i) * r * r * turn * spin
-    work = work / w.inverse_mass[i] + book_place(w, i, -dx * t, -dy * t)
+    work = work / w.inverse_mass[i] + add_place_work(w, i, -dx * t, -dy * t)
     w.work[WORK * i + (BY_IMPACTS if turn == 0 else BY_FRICTION)] += work
 
 
 @kernel
-def book_belt(
+def add_belt_work(
     w: cython.pointer(Step), i: cython.Py_ssize_t, k: cython.Py_ssize_t, jt: cython.double, nx: cython.double, ny: cython.double
 ) -> cython.void:
     """Book the impulse jt of surface contact k on particle i along (ny, -nx) as far as the surface moves: it is not friction."""
@@ -154,8 +154,8 @@ def book_belt(
 
 
 @kernel
-def book_grips(what: cython.p_void, block: cython.int) -> cython.void:
-    """Book the friction work of surfaces on a block in this substep: half the sum of slips before and after all contacts."""
+def add_grip_work(what: cython.p_void, block: cython.int) -> cython.void:
+    """Book the friction work of surfaces on a block in this substep: half the sum of slip before and after contacts."""
     w: cython.pointer(Step) = cython.cast(cython.pointer(Step), what)
     row: cython.pointer(cython.double) = w.contact
     h: cython.double = w.h
@@ -175,7 +175,7 @@ def book_grips(what: cython.p_void, block: cython.int) -> cython.void:
                 uy = 0.5 * (uy + w.motion[4 * i + 1] - w.acceleration[2 * i + 1] * h)
                 turn = 0.5 * (turn + w.motion[4 * i + 2]) * w.radius[i]
                 w.work[WORK * i + BY_FRICTION] += jt * (ux * ny - uy * nx - turn) / w.inverse_mass[i]
-                book_belt(w, i, k, jt, nx, ny)
+                add_belt_work(w, i, k, jt, nx, ny)
             if w.rolls and row[first + ROLL] != 0 and w.inverse_mass[i] > 0:
                 turn = 0.5 * (w.free_spin[i] + cython.cast(cython.double, w.motion[4 * i + 2]))
                 w.work[WORK * i + BY_ROLLING] += row[first + ROLL] * (turn - row[first + SPIN]) / w.inverse_mass[i]
@@ -184,8 +184,8 @@ def book_grips(what: cython.p_void, block: cython.int) -> cython.void:
 
 
 @kernel
-def book_rubbing(w: cython.pointer(Step), s: cython.Py_ssize_t) -> cython.void:
-    """Book the friction work of the pairs of group s in this substep, with mean slips: independent of the order of contacts."""
+def add_friction_work(w: cython.pointer(Step), s: cython.Py_ssize_t) -> cython.void:
+    """Book the friction work of the pairs of group s in this substep, with mean slip: independent of the order of contacts."""
     first: cython.Py_ssize_t = w.begin[s]
     for k in range(first, first + w.swept[s]):
         if w.tangent_impulse[k] != 0 or (w.rolls and w.roll_impulse[k] != 0):

@@ -3,6 +3,6 @@
 Importing this loads only the engine; libraries for file formats are loaded when needed.
 """
 
-from pyverlet.ground.submodules import lazily
+from pyverlet.common.submodules import lazily
 
 __getattr__, __dir__ = lazily(__name__)

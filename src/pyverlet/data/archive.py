@@ -17,9 +17,9 @@ from typing import Any, BinaryIO
 
 import numpy as np
 
-from pyverlet.ground.arrays import Array
-from pyverlet.ground.errors import InputError
-from pyverlet.ground.shown import cut
+from pyverlet.common.arrays import Array
+from pyverlet.common.errors import InputError
+from pyverlet.common.shown import cut
 
 INDEX = "arrays"  # key of the table for how arrays are stored
 
@@ -199,12 +199,12 @@ def _member(archive: zipfile.ZipFile, name: str, shape: tuple[int, ...], dtype: 
         if header != (shape, False, dtype) or not shape:
             raise ValueError(f"{name} is not as the table says")
         array: Array = np.empty(shape, dtype)
-        room, at = array.reshape(-1).view(np.uint8).data, 0
-        while at < len(room):
-            piece = member.read(min(_CHUNK, len(room) - at))
+        buffer, at = array.reshape(-1).view(np.uint8).data, 0
+        while at < len(buffer):
+            piece = member.read(min(_CHUNK, len(buffer) - at))
             if not piece:
                 raise ValueError(f"{name} ends early")
-            room[at : at + len(piece)] = piece
+            buffer[at : at + len(piece)] = piece
             at += len(piece)
         if member.read(1):
             raise ValueError(f"{name} goes on too long")

@@ -8,7 +8,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import BinaryIO, Self
 
-from pyverlet.ground.errors import InputError
+from pyverlet.common.errors import InputError
 
 
 class Closing:

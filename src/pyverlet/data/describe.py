@@ -13,13 +13,13 @@ from typing import Any
 
 import numpy as np
 
+from pyverlet.common import checks
+from pyverlet.common.errors import InputError
+from pyverlet.common.fields import Field
+from pyverlet.common.guess import did_you_mean
+from pyverlet.common.shown import brief
 from pyverlet.data import serialize
-from pyverlet.ground import checks
-from pyverlet.ground.errors import InputError
-from pyverlet.ground.fields import Field
-from pyverlet.ground.guess import did_you_mean
-from pyverlet.ground.shown import brief
-from pyverlet.laws import forces, integrators, naive, obstacles, rooms
+from pyverlet.laws import boundaries, forces, integrators, obstacles, textbook
 from pyverlet.laws.collisions import BruteForce, Collisions, Fast
 from pyverlet.laws.obstacles import Obstacle
 from pyverlet.laws.surface import Surface
@@ -84,8 +84,16 @@ def _kind(
 
 
 _cls: type
-_kind(rooms.Open)
-for _cls in (rooms.Circle, rooms.Box, rooms.Periodic, naive.ClampAndFlip, naive.ProjectOnly, Fast, BruteForce):
+_kind(boundaries.Open)
+for _cls in (
+    boundaries.Circle,
+    boundaries.Box,
+    boundaries.Periodic,
+    textbook.ClampAndFlip,
+    textbook.ProjectOnly,
+    Fast,
+    BruteForce,
+):
     _kind(_cls)
 
 
@@ -169,7 +177,7 @@ for _cls in _SHAPES:
 def _recall_emitter(emitter: Emitter, state: dict[str, Any]) -> None:
     if not state:
         return
-    due, emitted = checks.number("due", state["due"], least=0.0), checks.whole("emitted", state["emitted"], least=0)
+    due, emitted = checks.number("due", state["due"], least=0.0), checks.integer("emitted", state["emitted"], least=0)
     emitter.restore((due, emitted, state["random"]))
     emitter._rng.random()  # an invalid state fails here, not in the middle of a frame
     emitter.restore((due, emitted, state["random"]))
@@ -181,7 +189,7 @@ _kind(
 )  # fmt: skip
 _kind(
     Sink, state=lambda sink: {"removed": sink.removed},
-    recall=lambda sink, state: sink.restore(checks.whole("removed", state["removed"], least=0) if state else 0),
+    recall=lambda sink, state: sink.restore(checks.integer("removed", state["removed"], least=0) if state else 0),
 )  # fmt: skip
 
 
@@ -306,7 +314,7 @@ class Builder:
             numbers = np.asarray(serialize.unpack(value["numbers"]))
             Field(np.int64, "numbers", least=0, most=2**31).check(f"{name}: numbers", numbers, self.world.dtype, {})
             return Picked(self.world._state, numbers, self.world.remove)
-        first, count = checks.whole("first", value["first"], least=0), checks.whole("count", value["count"], least=0)
+        first, count = checks.integer("first", value["first"], least=0), checks.integer("count", value["count"], least=0)
         return Group(self.world._state, first, count, self.world.remove)
 
     def _taken(self, name: str, description: Mapping[str, Any]) -> Any:

@@ -5,10 +5,10 @@ from typing import Any
 
 import numpy as np
 
+from pyverlet.common.errors import InputError
+from pyverlet.common.fields import Field
 from pyverlet.data import serialize
 from pyverlet.data.describe import OBJECT, STATE, TYPE
-from pyverlet.ground.errors import InputError
-from pyverlet.ground.fields import Field
 from pyverlet.laws.links import Angle, AngleLimit, Area, Link, Motor, Pin, Rope, Spring, Stick
 from pyverlet.laws.links._link import REMEMBERED
 from pyverlet.world.world import World

@@ -5,8 +5,8 @@ from typing import Any
 
 import numpy as np
 
+from pyverlet.common.arrays import Array
 from pyverlet.data.trajectory import Frame, Reader, Walls, Writer
-from pyverlet.ground.arrays import Array
 from pyverlet.world.world import World
 
 SCHEMA = (1, 4)  # version of HOOMD's schema: https://gsd.readthedocs.io/en/stable/schema-hoomd.html

@@ -19,9 +19,9 @@ from typing import IO, Any
 import numpy as np
 
 from pyverlet import core
+from pyverlet.common.arrays import Array
+from pyverlet.common.errors import InputError, PyverletError
 from pyverlet.data.sweep_plan import bare
-from pyverlet.ground.arrays import Array
-from pyverlet.ground.errors import InputError, PyverletError
 from pyverlet.scenes import Scene
 from pyverlet.world.saved import Saved
 from pyverlet.world.world import World

@@ -10,16 +10,16 @@ from typing import Any
 
 import numpy as np
 
+from pyverlet.common.errors import InputError
+from pyverlet.common.guess import did_you_mean
+from pyverlet.common.outside import file_errors
 from pyverlet.data import describe_links, serialize
 from pyverlet.data.atomic_file import replacing
 from pyverlet.data.describe import Builder, describe
-from pyverlet.ground.errors import InputError
-from pyverlet.ground.guess import did_you_mean
-from pyverlet.ground.outside import file_errors
+from pyverlet.laws.boundaries import Boundary, Box, Circle
 from pyverlet.laws.collisions import Collisions
 from pyverlet.laws.integrators import Integrator
 from pyverlet.laws.links import Angle, AngleLimit, Area, Motor, Pin, Rope, Spring, Stick
-from pyverlet.laws.rooms import Boundary, Box, Circle
 from pyverlet.scenes import Settings, _start
 from pyverlet.state.group import Group
 from pyverlet.world import builders
@@ -43,11 +43,11 @@ class Recipe:
     def __init__(self, document: Table, path: Path) -> None:
         self._document, self._path = document, path
         world = document.get("world", {})
-        with self._told():
+        with self._explained():
             collisions = self._collisions(document)
-            room = self._room(document)
+            boundary = self._boundary(document)
             method = collisions.method if collisions else None
-            laws = collisions or room
+            laws = collisions or boundary
             self.defaults = Settings(
                 substeps=world.get("substeps", 8),
                 integrator=Builder().build("integrator", world.get("integrator") or {"type": "TimeCorrectedVerlet"}, Integrator),
@@ -68,7 +68,7 @@ class Recipe:
     def build(self, settings: Settings) -> World:
         """Build the world of this scene file."""
         document = copy.deepcopy(self._document)
-        with self._told():
+        with self._explained():
             changed = self._change(document, settings)
         world = self._world(document, settings)
         known = document.get("start_hash")
@@ -140,7 +140,7 @@ class Recipe:
         return changed
 
     @contextmanager
-    def _told(self, where: str = "") -> Iterator[None]:
+    def _explained(self, where: str = "") -> Iterator[None]:
         """Context that prefixes errors with the file, and the place in it."""
         try:
             yield
@@ -149,9 +149,9 @@ class Recipe:
             place = f"'{self._path}': " + (f"{where}: " if where and not said.startswith(where) else "")
             raise InputError(said if said.startswith(f"'{self._path}'") else place + said) from None
 
-    def _room(self, document: Table) -> Boundary:
-        room: Boundary = Builder().build("room", document.get("room") or {"type": "Open"}, Boundary)
-        return room
+    def _boundary(self, document: Table) -> Boundary:
+        boundary: Boundary = Builder().build("room", document.get("room") or {"type": "Open"}, Boundary)
+        return boundary
 
     def _collisions(self, document: Table) -> Collisions | None:
         table = document.get("collisions", {})
@@ -159,15 +159,15 @@ class Recipe:
 
     def _world(self, document: Table, settings: Settings) -> World:
         said = document.get("world", {})
-        with self._told():
+        with self._explained():
             own = {name: said.get(name, False) for name in ("events", "sleep")}
-            world = settings.empty_world(self._room(document), collisions=self._collisions(document), **own)
+            world = settings.empty_world(self._boundary(document), collisions=self._collisions(document), **own)
         named: dict[str, Group] = {}
         for k, table in enumerate(document.get("groups", [])):
-            with self._told(f"groups[{k}]"):
+            with self._explained(f"groups[{k}]"):
                 self._name(named, table, self._group(world, table))
         for k, table in enumerate(document.get("builders", [])):
-            with self._told(f"builders[{k}]"):
+            with self._explained(f"builders[{k}]"):
                 options = {key: value for key, value in table.items() if key not in ("type", "name", "pinned")}
                 if isinstance(options.get("outline"), dict):
                     options["outline"] = builders.disc(**options["outline"])
@@ -176,9 +176,9 @@ class Recipe:
                     built.group.pin(table["pinned"])
                 self._name(named, table, built.group)
         for k, table in enumerate(document.get("links", [])):
-            with self._told(f"links[{k}]"):
+            with self._explained(f"links[{k}]"):
                 world.links.append(_link(table, named))
-        with self._told():
+        with self._explained():
             if document.get("joined"):
                 describe_links.build(world, [_columns(table) for table in document["joined"]])
             tables: dict[str, list[Table]] = {}

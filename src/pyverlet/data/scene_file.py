@@ -10,15 +10,15 @@ from typing import Any
 import numpy as np
 
 from pyverlet import scenes
+from pyverlet.common import checks
+from pyverlet.common.errors import InputError
+from pyverlet.common.guess import did_you_mean
+from pyverlet.common.outside import file_errors
+from pyverlet.common.shown import brief
 from pyverlet.data import describe_links, serialize, settings_json, toml
 from pyverlet.data.atomic_file import replacing
 from pyverlet.data.describe import OBJECT, describe, describe_all
 from pyverlet.data.scene_build import COLUMNS, Recipe, Table, hash_of
-from pyverlet.ground import checks
-from pyverlet.ground.errors import InputError
-from pyverlet.ground.guess import did_you_mean
-from pyverlet.ground.outside import file_errors
-from pyverlet.ground.shown import brief
 from pyverlet.scenes import Scene, Settings
 from pyverlet.scenes._scene import Show
 from pyverlet.world.world import World
@@ -137,7 +137,7 @@ def freeze(world: World, path: Path) -> Table:
             "substeps": world.substeps,
             "dtype": world.dtype.name,
             "ledger": world.keeps_ledger,
-            "events": world.tells_events,
+            "events": world.records_events,
             "sleep": world._sleep is not None,
         },
         "room": describe(world.boundary),

@@ -9,10 +9,10 @@ from typing import Annotated, Any, Literal, Union
 
 from pydantic import BaseModel, ConfigDict, Field, create_model
 
+from pyverlet.common.constants import MOST_SUBSTEPS, STANDARD_GRAVITY
 from pyverlet.data.describe import KINDS, arguments_of
 from pyverlet.data.scene_build import LINKS
-from pyverlet.ground.constants import MOST_SUBSTEPS, STANDARD_GRAVITY
-from pyverlet.laws import naive, rooms
+from pyverlet.laws import boundaries, textbook
 from pyverlet.laws.collisions import BruteForce, Fast
 from pyverlet.laws.forces import Force
 from pyverlet.laws.integrators import Integrator
@@ -113,11 +113,13 @@ def _models(base: type | tuple[type, ...]) -> list[type[BaseModel]]:
     return found
 
 
-_walls = _models((rooms.Box, rooms.Circle))
+_walls = _models((boundaries.Box, boundaries.Circle))
 Walls: Any = _one_of(_walls)
 _ANNOTATED["Box | Circle"] = Walls
-Room: Any = _one_of([*_walls, *_models((rooms.Open, rooms.Periodic, naive.ClampAndFlip, naive.ProjectOnly))])
-_ANNOTATED["Boundary"] = Room
+BoundaryModel: Any = _one_of(
+    [*_walls, *_models((boundaries.Open, boundaries.Periodic, textbook.ClampAndFlip, textbook.ProjectOnly))]
+)
+_ANNOTATED["Boundary"] = BoundaryModel
 Method: Any = _one_of(_models((Fast, BruteForce)))
 Integrators: Any = _one_of(_models(Integrator))
 Forces: Any = _one_of(_models(Force))
@@ -278,7 +280,7 @@ class Document(Part):
     scene: str | None = None  # name from `pyverlet list`; then only `settings`, `run` and `view` may follow
     settings: SceneSettings | None = None
     world: World = Field(default_factory=World)
-    room: Room | None = None  # Open by default
+    room: BoundaryModel | None = None  # Open by default
     collisions: Collisions | Literal[False] = Field(default_factory=Collisions)
     groups: list[Groups] = []
     builders: list[Builders] = []

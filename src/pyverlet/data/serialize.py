@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from pyverlet.ground.errors import InputError
+from pyverlet.common.errors import InputError
 
 TUPLE, NUMBER, ARRAY = "$tuple", "$number", "$array"
 _MARKS = {TUPLE, NUMBER, ARRAY}

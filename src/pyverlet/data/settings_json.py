@@ -12,9 +12,9 @@ from typing import Any
 
 import numpy as np
 
+from pyverlet.common.errors import InputError
 from pyverlet.data import serialize
 from pyverlet.data.describe import KINDS, TYPE, Builder, describe
-from pyverlet.ground.errors import InputError
 from pyverlet.scenes import Scene, Settings
 from pyverlet.scenes.sketch import Given, Sketch, SketchScene
 from pyverlet.world.world import World

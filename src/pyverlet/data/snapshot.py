@@ -11,17 +11,17 @@ from typing import Any
 
 import numpy as np
 
+from pyverlet.common import checks
+from pyverlet.common.arrays import Array
+from pyverlet.common.errors import InputError
+from pyverlet.common.threads import max_threads
 from pyverlet.core.sources import sources_hash
 from pyverlet.data import archive, describe_links, serialize
 from pyverlet.data.atomic_file import replacing
 from pyverlet.data.describe import Builder, describe, describe_all
-from pyverlet.ground import checks
-from pyverlet.ground.arrays import Array
-from pyverlet.ground.errors import InputError
-from pyverlet.ground.threads import max_threads
+from pyverlet.laws.boundaries import Boundary
 from pyverlet.laws.collisions import Collisions
 from pyverlet.laws.integrators import Integrator
-from pyverlet.laws.rooms import Boundary
 from pyverlet.world import copies
 from pyverlet.world import parts as apart
 from pyverlet.world.measures import hash_of
@@ -212,7 +212,7 @@ def from_bytes(content: bytes) -> World:
 
 def _migrated(header: Header, arrays: dict[str, Array]) -> bool:
     """Convert contents to the current format. Returns whether that was necessary."""
-    first = number = checks.whole("format", header.get("format"))
+    first = number = checks.integer("format", header.get("format"))
     if number > FORMAT:
         raise InputError(f"format is {number}, of a newer pyverlet; allowed are 1 to {FORMAT}")
     for older in range(number, FORMAT):
@@ -237,7 +237,7 @@ def _world(settings: dict[str, Any], moving: Parts, objects: list[Any]) -> World
         boundary=builder.build("boundary", settings["boundary"], Boundary),
         collisions=settings["collisions"] and builder.build("collisions", settings["collisions"], Collisions),
         integrator=builder.build("integrator", settings["integrator"], Integrator),
-        threads=None if threads is None else min(checks.whole("threads", threads), max_threads()),
+        threads=None if threads is None else min(checks.integer("threads", threads), max_threads()),
         contacts=settings.get("contacts", False),
         **{name: settings[name] for name in ("gravity", "substeps", "dtype", "ledger", "events", "sleep")},
     )

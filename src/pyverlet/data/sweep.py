@@ -12,12 +12,12 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from pyverlet.common import checks
+from pyverlet.common.errors import InputError
+from pyverlet.common.progress import Progress
 from pyverlet.data import settings_json, sweep_plan, sweep_run
 from pyverlet.data.settings_json import LazySketch, plain
 from pyverlet.data.sweep_plan import SCENE_FILE, SKETCH, Plan, Rows
-from pyverlet.ground import checks
-from pyverlet.ground.errors import InputError
-from pyverlet.ground.progress import Progress
 from pyverlet.scenes import Scene, get
 from pyverlet.world.world import World
 
@@ -206,7 +206,7 @@ class Study:
 
     def world(self, k: int) -> World:
         """The initial world of run k, for viewing: `pv.view(study.world(17))`."""
-        return self._plan.world(self._runs[checks.whole("k", k, least=0, most=len(self._runs) - 1)])
+        return self._plan.world(self._runs[checks.integer("k", k, least=0, most=len(self._runs) - 1)])
 
     def verify(self, rows: int = 5, *, seed: int | None = None) -> Verified:
         """Repeat some runs in this process, drawn at random, and compare hashes and measurements.
@@ -217,7 +217,7 @@ class Study:
         """
         known = Rows(self._folder, read_only=True)
         ready = [run for run in self._runs if (row := known.get(run.key)) is not None and row["error"] is None]
-        most = checks.whole("rows", rows)
+        most = checks.integer("rows", rows)
         chosen = np.random.default_rng(seed).permutation(len(ready))[:most]
         picked = sorted((ready[k] for k in chosen), key=lambda run: run.number)
         differ = []

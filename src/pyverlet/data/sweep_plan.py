@@ -22,14 +22,14 @@ from typing import Any, BinaryIO, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from pyverlet.common import file_lock
+from pyverlet.common.errors import InputError
+from pyverlet.common.shown import cut
 from pyverlet.core.sources import sources_hash
 from pyverlet.data import serialize
 from pyverlet.data.atomic_file import Closing, replacing
 from pyverlet.data.settings_json import plain, to_json
 from pyverlet.data.snapshot import versions
-from pyverlet.ground import file_lock
-from pyverlet.ground.errors import InputError
-from pyverlet.ground.shown import cut
 from pyverlet.scenes import SCENES, Scene
 from pyverlet.world.world import World
 

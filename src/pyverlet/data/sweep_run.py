@@ -15,11 +15,11 @@ from typing import Any
 
 import numpy as np
 
+from pyverlet.common import checks
+from pyverlet.common.errors import InputError, Interrupted, PyverletError
+from pyverlet.common.threads import max_threads
 from pyverlet.data.settings_json import to_json
 from pyverlet.data.sweep_plan import Plan, Run, bare, made_by
-from pyverlet.ground import checks
-from pyverlet.ground.errors import InputError, Interrupted, PyverletError
-from pyverlet.ground.threads import max_threads
 
 Row = dict[str, Any]
 Task = list[Run]
@@ -117,7 +117,7 @@ def make(
         return
     own = executor is None
     if executor is None:
-        count = checks.whole("processes", max_threads() if processes is None else processes)
+        count = checks.integer("processes", max_threads() if processes is None else processes)
         # Not forked, as threads of a parallel kernel do not survive that.
         makes: Any = Here if count == 1 else lambda: ProcessPoolExecutor(count, get_context("spawn"), _watch_parent)
         workers = count
@@ -125,7 +125,7 @@ def make(
         if not callable(getattr(executor, "submit", None)):
             raise InputError(f"executor is {executor!r}; allowed is a concurrent.futures.Executor, and None")
         makes, workers = (lambda: executor), workers or getattr(executor, "_max_workers", None) or 4 * (os.cpu_count() or 1)
-    yield from _Dispatcher(plan, runs, makes, checks.whole("workers", workers), own=own).rows()
+    yield from _Dispatcher(plan, runs, makes, checks.integer("workers", workers), own=own).rows()
 
 
 def _watch_parent() -> None:

@@ -11,14 +11,14 @@ from typing import Any, Self, overload
 import numpy as np
 from numpy.typing import NDArray
 
+from pyverlet.common import checks
+from pyverlet.common.arrays import Array
+from pyverlet.common.errors import InputError, PyverletError
+from pyverlet.common.interrupts import without_interrupts
+from pyverlet.common.outside import file_errors, require
+from pyverlet.common.progress import OnProgress
+from pyverlet.common.shown import Shown
 from pyverlet.data.atomic_file import Closing
-from pyverlet.ground import checks
-from pyverlet.ground.arrays import Array
-from pyverlet.ground.errors import InputError, PyverletError
-from pyverlet.ground.interrupts import whole
-from pyverlet.ground.outside import file_errors, require
-from pyverlet.ground.progress import OnProgress
-from pyverlet.ground.shown import Shown
 from pyverlet.world.world import World
 
 ROOM = 1.5  # half width of the box of an unbounded world, over the extent of its circles
@@ -161,7 +161,7 @@ class Trajectory(Shown, Closing):
 
     def __init__(self, path: str | Path, *, every: int = 1) -> None:
         self.path = checks.path("path", path)
-        self.every = checks.whole("every", every)
+        self.every = checks.integer("every", every)
         self.frames = 0
         self._last: tuple[int, float] | None = None
         kind = _kind(self.path, "Writer")
@@ -178,7 +178,7 @@ class Trajectory(Shown, Closing):
         if self._writer is None:
             raise InputError(f"trajectory '{self.path}' is closed; allowed is one in its with statement")
         try:
-            with whole:  # Ctrl-C is delayed until the whole frame is in the file
+            with without_interrupts:  # Ctrl-C is delayed until the whole frame is in the file
                 self._writer.add(Frame.of(world), world)
         except OSError as error:
             reason = error.strerror or error

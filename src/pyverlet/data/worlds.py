@@ -13,15 +13,15 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from pyverlet.common import checks
+from pyverlet.common.arrays import Array
+from pyverlet.common.errors import InputError
+from pyverlet.common.shown import Shown
+from pyverlet.common.threads import max_threads
 from pyverlet.data import snapshot
 from pyverlet.data.atomic_file import Closing
 from pyverlet.data.process_pool import Plan, ProcessPool, Worker
 from pyverlet.data.trajectory import Column
-from pyverlet.ground import checks
-from pyverlet.ground.arrays import Array
-from pyverlet.ground.errors import InputError
-from pyverlet.ground.shown import Shown
-from pyverlet.ground.threads import max_threads
 from pyverlet.scenes import Scene, get
 from pyverlet.world.world import World
 
@@ -60,12 +60,12 @@ class Worlds(Shown, Closing):
 
     def __init__(self, scene: str | Scene, n: int, *, seed: int = 0, processes: int | None = None, **settings: Any) -> None:
         self.scene = get(scene) if isinstance(scene, str) else scene
-        self._count = checks.whole("n", n)
-        self.seed = checks.whole("seed", seed, least=0)
+        self._count = checks.integer("n", n)
+        self.seed = checks.integer("seed", seed, least=0)
         settings = {"threads": 1} | settings
         if processes is None:
             processes = max(min(max_threads(), self._count // _WORTH_A_PROCESS), 1)
-        processes = checks.whole("processes", processes, most=self._count, most_is=", one for each world")
+        processes = checks.integer("processes", processes, most=self._count, most_is=", one for each world")
         first = self.scene.world(**settings, seed=seed_of(self.seed, 0))
         threads = max(max_threads() // processes, 1)
         plan = Plan(self.scene, settings, self.seed, self._count, len(first), first.dtype.str, threads)

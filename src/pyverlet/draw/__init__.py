@@ -3,7 +3,7 @@
 `fit` makes the view that maps metres to pixels; `View` has `to_screen`, `to_world`, `zoomed`, `moved`, `pick`.
 """
 
-from pyverlet.ground.submodules import lazily
+from pyverlet.common.submodules import lazily
 from pyverlet.picture import View
 from pyverlet.viewers.frames import Camera
 from pyverlet.world.world import World

@@ -24,7 +24,7 @@ class Circles(ShaderCircles):
         self._program = self._context.program(vertex_shader=VERTEX, fragment_shader=FRAGMENT)
         self._room = 0
 
-    def _make_room(self, count: int) -> None:
+    def _reserve(self, count: int) -> None:
         """Allocate buffers for `count` circles, as they cannot grow."""
         self._room = count
         formats = (("2f", "place", 8), ("1f", "radius", 4), ("1f", "angle", 4), ("4f1", "tint", 4))
@@ -47,7 +47,7 @@ class Circles(ShaderCircles):
         if count == 0:
             return
         if count > self._room:
-            self._make_room(2 * count)
+            self._reserve(2 * count)
         for buffer, array in zip(self._buffers, arrays, strict=True):
             buffer.write(array.data.cast("B"))
         self._set_uniforms(view, pixel_ratio)

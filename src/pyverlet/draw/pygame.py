@@ -3,7 +3,7 @@
 import numpy as np
 import pygame
 
-from pyverlet.ground.errors import InputError
+from pyverlet.common.errors import InputError
 from pyverlet.picture import DARK, ByOrigin, Colouring, Theme, View, periodic_images
 from pyverlet.picture.colour import Packed, by_force
 from pyverlet.picture.raster import paint

@@ -1,6 +1,6 @@
 """The laboratory: solves equations of motion, and measures worlds and integrators against exact solutions."""
 
-from pyverlet.ground.submodules import lazily
+from pyverlet.common.submodules import lazily
 from pyverlet.lab.problems import Equation
 from pyverlet.lab.solver import Solution, solve
 

@@ -8,9 +8,9 @@ from typing import Any
 
 import numpy as np
 
-from pyverlet.ground.arrays import Floats
-from pyverlet.ground.errors import InputError
-from pyverlet.ground.progress import OnProgress
+from pyverlet.common.arrays import Floats
+from pyverlet.common.errors import InputError
+from pyverlet.common.progress import OnProgress
 from pyverlet.laws.integrators import Integrator
 from pyverlet.scenes import Scene, Settings
 

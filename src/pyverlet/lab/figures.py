@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from pyverlet.ground.arrays import Floats
-from pyverlet.ground.errors import InputError
-from pyverlet.ground.outside import file_errors, require
+from pyverlet.common.arrays import Floats
+from pyverlet.common.errors import InputError
+from pyverlet.common.outside import file_errors, require
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

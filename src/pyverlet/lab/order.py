@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from pyverlet.ground.arrays import Floats
+from pyverlet.common.arrays import Floats
 from pyverlet.lab import figures
 from pyverlet.lab.problems import PROBLEMS, Equation, Problem
 from pyverlet.laws.integrators import Integrator, PositionVerlet, TimeCorrectedVerlet

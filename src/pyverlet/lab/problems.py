@@ -10,12 +10,12 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import ArrayLike
 
-from pyverlet.ground.arrays import Floats
-from pyverlet.ground.errors import InputError
+from pyverlet.common.arrays import Floats
+from pyverlet.common.errors import InputError
 from pyverlet.lab.solver import Acceleration, Solution, solve
 from pyverlet.laws.forces import Attractor, Drag, PointSpring
 from pyverlet.laws.integrators import RK4, Integrator
-from pyverlet.state.slots import Slots
+from pyverlet.state.sorted_state import SortedState
 from pyverlet.state.state import State
 from pyverlet.world.world import World
 
@@ -166,7 +166,7 @@ class Pendulum:
 
     velocity_dependent = False
 
-    def apply(self, state: Slots, t: float) -> None:
+    def apply(self, state: SortedState, t: float) -> None:
         state.force[:, 1] += state.mass * (G / LENGTH) * np.sin(state.position[:, 1])
 
     def potential(self, state: State) -> float:

@@ -6,11 +6,11 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from pyverlet.ground import checks
-from pyverlet.ground.arrays import Floats
-from pyverlet.ground.errors import InputError, NonFiniteError
+from pyverlet.common import checks
+from pyverlet.common.arrays import Floats
+from pyverlet.common.errors import InputError, NonFiniteError
 from pyverlet.laws.integrators import Integrator, TimeCorrectedVerlet
-from pyverlet.state.slots import Slots
+from pyverlet.state.sorted_state import SortedState
 from pyverlet.state.state import State
 
 Acceleration = Callable[[float, Any, Any], ArrayLike]
@@ -80,18 +80,18 @@ def solve(
         raise InputError(f"h makes {len(times) - 1} steps; allowed are at most {_MOST_NUMBERS:g} numbers in what is returned")
     v = np.broadcast_to(v, x.shape)
     found = Solution(times, np.empty((len(times), *x.shape)), np.empty((len(times), *x.shape)))
-    slots, forces = _slots(x, v), _Accelerations(F, x.shape)
+    sorted_state, forces = _sorted_rows(x, v), _Accelerations(F, x.shape)
     found.positions[0], found.velocities[0] = x, v
     h_last = None
     # Exactly equal, which differences of times are not: methods restart where the step changes.
     steps = np.asarray(h, float) if np.ndim(h) else np.full(len(times) - 1, (times[-1] - times[0]) / (len(times) - 1))
     for k, step in enumerate(map(float, steps)):
-        method.full_step(slots, forces, times[k], step, h_last)
-        found.positions[k + 1] = forces.shaped(slots.position)
-        found.velocities[k + 1] = forces.shaped(slots.velocity)
+        method.full_step(sorted_state, forces, times[k], step, h_last)
+        found.positions[k + 1] = forces.shaped(sorted_state.position)
+        found.velocities[k + 1] = forces.shaped(sorted_state.velocity)
         h_last = step
-        if not np.isfinite(slots.position).all():
-            component = int(np.flatnonzero(~np.isfinite(slots.position.ravel()))[0])
+        if not np.isfinite(sorted_state.position).all():
+            component = int(np.flatnonzero(~np.isfinite(sorted_state.position.ravel()))[0])
             says = f"x has left the finite numbers at time {times[k + 1]:.6g}; steps are {step:g} long, shorter ones may do"
             raise NonFiniteError(component, "integrate", float(times[k + 1]), says)
     return found
@@ -129,18 +129,18 @@ def _times(start: float, until: float | None, h: float | ArrayLike) -> Floats:
     return start + np.concatenate(([0.0], np.cumsum(lengths)))
 
 
-def _slots(x: Floats, v: Floats) -> Slots:
+def _sorted_rows(x: Floats, v: Floats) -> SortedState:
     """The components of x, two per row, as particles; the last one is padded with 0."""
     rows = {"position": x, "velocity": v}
     count = max(1, (x.size + 1) // 2)
     for name, given in rows.items():
         rows[name] = np.zeros((count, 2))
         rows[name].reshape(-1)[: x.size] = given.reshape(-1)
-    state, slots = State(np.dtype(np.float64)), Slots(np.dtype(np.float64))
+    state, sorted_state = State(np.dtype(np.float64)), SortedState(np.dtype(np.float64))
     rows["acceleration"] = np.full((count, 2), np.nan)
     state.append(rows | {"spin": np.zeros(count), "mass": np.ones(count), "radius": np.ones(count)})
-    slots.gather(state)
-    return slots
+    sorted_state.gather(state)
+    return sorted_state
 
 
 class _Accelerations:
@@ -156,7 +156,7 @@ class _Accelerations:
         flat = rows.reshape(-1)[: self._size]
         return flat.reshape(self._shape).copy() if self._shape else float(flat[0])
 
-    def __call__(self, state: Slots, t: float) -> None:
+    def __call__(self, state: SortedState, t: float) -> None:
         given = self._function(float(t), self.shaped(state.position), self.shaped(state.velocity))
         try:
             a = np.asarray(given, np.float64)

@@ -7,10 +7,10 @@ from typing import Any, TypeVar
 import numpy as np
 
 from pyverlet import scenes
-from pyverlet.ground.progress import OnProgress
+from pyverlet.common.progress import OnProgress
 from pyverlet.lab.physics._check import RADIUS, circles
 from pyverlet.lab.physics.energy import scale
-from pyverlet.laws.rooms import Box
+from pyverlet.laws.boundaries import Box
 from pyverlet.scenes.gas import henderson
 
 T = TypeVar("T")
@@ -90,9 +90,9 @@ def measure_pressure(fraction: float, step: float, *, seconds: float) -> dict[st
     place = RADIUS + (np.arange(SIDE) + 0.5) * (side - 2 * RADIUS) / SIDE
     velocity = rng.normal(0, 1, (count, 2))
     velocity *= SPEED / np.sqrt((velocity**2).sum(axis=1).mean())
-    room, place = Box((0, 0), (side, side), restitution=1.0), np.stack(np.meshgrid(place, place), -1).reshape(-1, 2)
+    boundary, place = Box((0, 0), (side, side), restitution=1.0), np.stack(np.meshgrid(place, place), -1).reshape(-1, 2)
     world = circles(
-        place, room, velocity=velocity, e=1.0, gravity=(0, 0), substeps=1, dtype=np.float64, threads=1, contacts=True,
+        place, boundary, velocity=velocity, e=1.0, gravity=(0, 0), substeps=1, dtype=np.float64, threads=1, contacts=True,
     )  # fmt: skip
     frames, overlap, pushed, dt = round(seconds * SPEED / (step * RADIUS)), 0.0, 0.0, step * RADIUS / SPEED
     for frame in range(frames):

@@ -9,10 +9,10 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from pyverlet.common import checks
+from pyverlet.common.arrays import Array
+from pyverlet.common.errors import InputError
 from pyverlet.core import unit
-from pyverlet.ground import checks
-from pyverlet.ground.arrays import Array
-from pyverlet.ground.errors import InputError
 from pyverlet.state.state import State
 
 
@@ -154,7 +154,7 @@ _NONE = np.empty(0, np.int64)
 
 def _touching(state: State, radius: Array, apart: Array, pairs: Array) -> tuple[int, float, float]:
     """`core.touching` for a state with these radii."""
-    s, seam = state.shown, state.seam
-    about = seam.wrapped(s["position"]), radius, s["mass"], s["category"], s["mask"], *seam.period, seam.images()
+    s, periodic = state.shown, state.periodic
+    about = periodic.wrapped(s["position"]), radius, s["mass"], s["category"], s["mask"], *periodic.period, periodic.images()
     found: tuple[int, float, float] = unit("tools", state.dtype).touching(*about, apart, pairs)
     return found

@@ -7,15 +7,15 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from pyverlet.common import checks
+from pyverlet.common.arrays import Array, Floats
+from pyverlet.common.constants import FIRST_OBSTACLE
 from pyverlet.core import unit
-from pyverlet.ground import checks
-from pyverlet.ground.arrays import Array, Floats
-from pyverlet.ground.constants import FIRST_OBSTACLE
+from pyverlet.laws.boundaries import Boundary
 from pyverlet.laws.obstacles import Obstacle, ObstacleArrays
-from pyverlet.laws.rooms import Boundary
-from pyverlet.state.seam import Seam
-from pyverlet.state.slots import Slots
-from pyverlet.state.state import State, meet
+from pyverlet.state.periodicity import Periodicity
+from pyverlet.state.sorted_state import SortedState
+from pyverlet.state.state import State, may_collide
 
 WALL = -1
 """Value of b for a wall of the room or an obstacle."""
@@ -46,7 +46,7 @@ _AT, _SPACINGS, _ALIKE = 1e-6, 4.0, 1e-3
 particles that move alike, below the last."""
 
 
-class Told(NamedTuple):
+class RecordedEvents(NamedTuple):
     """Recorded contacts, in any order."""
 
     keys: Array
@@ -59,12 +59,12 @@ class Told(NamedTuple):
     """Normal impulses over the reduced mass, or that of the particle, m/s."""
 
     @classmethod
-    def of(cls, parts: list[Told]) -> Told:
+    def of(cls, parts: list[RecordedEvents]) -> RecordedEvents:
         """Concatenate records."""
         return parts[0] if len(parts) == 1 else cls(*(np.concatenate([part[k] for part in parts]) for k in range(4)))
 
 
-_NOTHING = Told(np.zeros(0, np.int64), np.zeros(0), np.zeros(0, np.int64), np.zeros(0))
+_NOTHING = RecordedEvents(np.zeros(0, np.int64), np.zeros(0), np.zeros(0, np.int64), np.zeros(0))
 
 
 class Events:
@@ -95,7 +95,7 @@ class Events:
         self.begin, self.hit, self.end = _NO_HITS, _NO_HITS, _NO_CONTACTS
         self._touching = np.empty(0, np.int64)  # keys, sorted
         self._obstacles: list[Obstacle] | None = None  # obstacles that the keys number; None: no keys yet
-        self._told = _NOTHING
+        self._recorded = _NOTHING
         self._slept = np.zeros(0, np.int64)  # contacts of particles that slept at the start of the frame and have woken in it
         self._sensed: list[Array] | None = None  # keys of contacts with sensors: in this frame, and at its end; None: unchanged
         self._sensed_at = -1  # `ObstacleArrays.version` when sensors were last evaluated; -1: never
@@ -137,17 +137,17 @@ class Events:
 
     # ---- what the engine tells ---------------------------------------------------------------------------------------
 
-    def hear(self, told: Told) -> None:
+    def record(self, recorded: RecordedEvents) -> None:
         """Set the records of this frame, without those of user-defined walls."""
-        self._told = told
+        self._recorded = recorded
 
-    def wake(self, slots: Slots, state: State) -> None:
+    def wake(self, sorted_state: SortedState, state: State) -> None:
         """Before sleepers wake within a frame: keep their contacts, which existed until then."""
-        self._slept = np.concatenate((self._slept, self._sleeping(slots, state)))
+        self._slept = np.concatenate((self._slept, self._sleeping(sorted_state, state)))
 
     def forget(self) -> None:
         """Discard the records, as a frame begins or is repeated."""
-        self._told, self._slept, self._sensed = _NOTHING, self._slept[:0], None
+        self._recorded, self._slept, self._sensed = _NOTHING, self._slept[:0], None
 
     def senses(self, obstacles: ObstacleArrays) -> bool:
         """Whether contacts with sensors may have changed although no remaining particle moves."""
@@ -157,32 +157,32 @@ class Events:
         """Set the sorted keys of contacts with sensors during this frame, and at its end."""
         self._sensed, self._sensed_at = [touched, inside], obstacles.version
 
-    def close(self, slots: Slots, state: State, place: Place) -> None:
+    def close(self, sorted_state: SortedState, state: State, place: Place) -> None:
         """After a successful frame: convert its records to events; `place`: room and obstacles."""
         lost, sensors = self._number_obstacles(place.obstacles.seen), place.obstacles.sensors
         touched, inside = self._sensed or [self._touching[_of(self._touching, sensors)]] * 2
-        told = Told.of([self._told, *place.walls(slots, state)])
+        recorded = RecordedEvents.of([self._recorded, *place.walls(sorted_state, state)])
         # Contacts of sleepers are not recorded, but continue, also for sensors. Sorting keys alone takes a third of the time of
         # an argsort.
-        slept = np.concatenate((self._slept, self._sleeping(slots, state)))
-        now = np.sort(np.concatenate((told.keys, touched, slept[~_of(slept, sensors)] if sensors else slept)))
+        slept = np.concatenate((self._slept, self._sleeping(sorted_state, state)))
+        now = np.sort(np.concatenate((recorded.keys, touched, slept[~_of(slept, sensors)] if sensors else slept)))
         now = now[: _tools().drop_repeated(now)]
         if len(silent := _absent(self._touching, now)):
             still = silent[place.touch(_contacts(silent, state), state)]
             now = np.insert(now, np.searchsorted(now, still), still)
         gone, new = _absent(self._touching, now), _absent(now, self._touching)
         left = _absent(touched, inside)  # sensors that were crossed
-        if not (len(lost) or len(left) or len(gone) or len(new) or np.count_nonzero(told.bounces)):
+        if not (len(lost) or len(left) or len(gone) or len(new) or np.count_nonzero(recorded.bounces)):
             self.begin, self.hit, self.end = _NO_HITS, _NO_HITS, _NO_CONTACTS
             self.forget()
             return
         # Every bounce begins a contact, and all but the last one end it; the first also ends a contact of the frame before.
-        again, bounces = _counted(told)
+        again, bounces = _counted(recorded)
         begun = np.unique(np.concatenate((new, again)))
         times = np.ones(len(begun), np.int64)
         times[np.searchsorted(begun, again)] = bounces
         ended = np.concatenate((lost, gone, left, np.repeat(again, bounces - 1 + _among(again, self._touching))))
-        speeds, pushes = _told_of(begun, told)
+        speeds, pushes = _sums_of(begun, recorded)
         self._touching = _absent(now, left)
         self.end = _contacts(np.sort(ended ^ SURFACE) ^ SURFACE, state)  # walls and obstacles before particles
         order = np.argsort(begun ^ SURFACE)
@@ -214,11 +214,11 @@ class Events:
         self._touching = np.sort(np.concatenate((self._touching[~at_wall], (keys[kept] & ~LOST) | which[kept])))
         return lost
 
-    def _sleeping(self, slots: Slots, state: State) -> Array:
+    def _sleeping(self, sorted_state: SortedState, state: State) -> Array:
         """The contacts of the frame before in which both circles sleep, or one sleeps and the other is pinned."""
-        if not len(slots.asleep):
+        if not len(sorted_state.asleep):
             return self._touching[:0]
-        asleep = np.sort(state.number[slots.particle[slots.asleep]])
+        asleep = np.sort(state.number[sorted_state.particle[sorted_state.asleep]])
         pinned = np.sort(state.number[~np.isfinite(state.shown["mass"])])
         a, b = self._touching >> 32, (self._touching & _LOWER) - 1
         first, second = _among(a, asleep), (b >= SURFACE - 1) | _among(b, asleep)
@@ -228,7 +228,7 @@ class Events:
 class Place(NamedTuple):
     """The surroundings of particles: room, obstacles, and whether particles collide."""
 
-    room: Boundary
+    boundary: Boundary
     obstacles: ObstacleArrays
     collides: bool
     """Whether circles collide with each other."""
@@ -244,12 +244,12 @@ class Place(NamedTuple):
             (at[name][a].astype(float), at[name][b].astype(float)) for name in ("position", "velocity", "radius")
         )
         category, mask, rounded = at["category"], at["mask"], _SPACINGS * float(np.finfo(state.dtype).eps)
-        meets = self.room.holds(category[a], mask[a])
-        meets[pair] = self.collides & meet(category[a], mask[a], category[b], mask[b])[pair]
+        meets = self.boundary.holds(category[a], mask[a])
+        meets[pair] = self.collides & may_collide(category[a], mask[a], category[b], mask[b])[pair]
         for k in np.flatnonzero(met["obstacle"] >= 0):
             obstacle = self.obstacles.seen[met["obstacle"][k]]
-            meets[k] = not obstacle.sensor and meet(category[a[k]], mask[a[k]], obstacle.category, obstacle.mask)
-        gap = np.hypot(*self.room.seam.nearest(y - x).T) - r - s
+            meets[k] = not obstacle.sensor and may_collide(category[a[k]], mask[a[k]], obstacle.category, obstacle.mask)
+        gap = np.hypot(*self.boundary.periodic.nearest(y - x).T) - r - s
         gap[~pair] = self._facing(x[~pair], met["wall"][~pair], met["obstacle"][~pair])[0] - r[~pair]
         # Two particles that move alike are each rounded by their own coordinates.
         alike = pair & (np.hypot(*(v - u).T) <= rounded * np.hypot(*u.T))
@@ -258,45 +258,45 @@ class Place(NamedTuple):
         return np.asarray(found)
 
     def hits(self, met: Array, speed: Array, push: Array, state: State) -> Array:
-        """HIT records from CONTACT, speeds and `Told.pushes`, at the current positions."""
+        """HIT records from CONTACT, speeds and `RecordedEvents.pushes`, at the current positions."""
         found, at = np.zeros(len(met), HIT), state.shown
         for name in CONTACT.names or ():
             found[name] = met[name]
         found["speed"] = speed
         pair, single = np.flatnonzero(met["b"] != WALL), np.flatnonzero(met["b"] == WALL)
 
-        def of(values: Array, who: Array) -> Array:
-            return values[who].astype(float)
+        def of(values: Array, which: Array) -> Array:
+            return values[which].astype(float)
 
         weight = 1 / of(at["mass"], met["a"])
         if len(pair):
             a, b = met["a"][pair], met["b"][pair]
             x, y, r, s = of(at["position"], a), of(at["position"], b), of(at["radius"], a), of(at["radius"], b)
-            found["point"][pair], found["normal"][pair] = between(self.room.seam, x, y, r, s)
+            found["point"][pair], found["normal"][pair] = between(self.boundary.periodic, x, y, r, s)
             weight[pair] += 1 / of(at["mass"], b)
         if len(single):
             x = of(at["position"], met["a"][single])
             gap, into = self._facing(x, met["wall"][single], met["obstacle"][single])
-            found["point"][single], found["normal"][single] = self.room.seam.wrapped(x - gap[:, None] * into), -into
+            found["point"][single], found["normal"][single] = self.boundary.periodic.wrapped(x - gap[:, None] * into), -into
         found["impulse"] = push / np.where(weight > 0, weight, np.inf)
         return found
 
-    def walls(self, slots: Slots, state: State) -> list[Told]:
+    def walls(self, sorted_state: SortedState, state: State) -> list[RecordedEvents]:
         """Records of a user-defined room in this frame, each for the nearest of its walls."""
-        if not slots.own_walls:
+        if not sorted_state.own_walls:
             return []
-        at = np.flatnonzero(slots.wall_hits[:, 0] >= 0)
-        facing = self.room.facing(slots.position[at]) if len(at) else None
+        at = np.flatnonzero(sorted_state.wall_hits[:, 0] >= 0)
+        facing = self.boundary.facing(sorted_state.position[at]) if len(at) else None
         nearest = np.zeros(len(at), np.int64) if facing is None else np.argmin(facing[0], axis=1)
-        keys = (state.number[slots.particle[at]] << 32) + SURFACE + nearest
-        speeds, pushes = slots.wall_hits[at].T.astype(float)
-        return [Told(keys, speeds, np.zeros(len(at), np.int64), pushes)]
+        keys = (state.number[sorted_state.particle[at]] << 32) + SURFACE + nearest
+        speeds, pushes = sorted_state.wall_hits[at].T.astype(float)
+        return [RecordedEvents(keys, speeds, np.zeros(len(at), np.int64), pushes)]
 
     def _facing(self, x: Array, wall: Array, obstacle: Array) -> tuple[Array, Array]:
         """Distances of walls or obstacles from centres x, m, and their normals; NaN where unknown."""
         gap, into = np.full(len(x), np.nan), np.full((len(x), 2), np.nan)
         rows = np.flatnonzero(wall >= 0)
-        if len(rows) and (found := self.room.facing(x[rows])) is not None:
+        if len(rows) and (found := self.boundary.facing(x[rows])) is not None:
             gap[rows], into[rows] = (each[np.arange(len(rows)), wall[rows]] for each in found)
         rows = np.flatnonzero(obstacle >= 0)
         if len(rows):
@@ -304,12 +304,12 @@ class Place(NamedTuple):
         return gap, into
 
 
-def between(seam: Seam, x: Floats, y: Floats, r: Floats, s: Floats) -> tuple[Floats, Floats]:
+def between(periodic: Periodicity, x: Floats, y: Floats, r: Floats, s: Floats) -> tuple[Floats, Floats]:
     """(k, 2) m, contact points of circles at x and y (k, 2) with radii r and s (k,), and unit normals from first to second."""
-    way = seam.nearest(y - x)
+    way = periodic.nearest(y - x)
     far = np.hypot(*way.T)
     normal = way / np.maximum(far, 1e-300)[:, None]
-    return seam.wrapped(x + (r + 0.5 * (far - r - s))[:, None] * normal), normal
+    return periodic.wrapped(x + (r + 0.5 * (far - r - s))[:, None] * normal), normal
 
 
 def key_of_surface(a: Array, number: Array, obstacle: Array) -> Array:
@@ -325,11 +325,11 @@ def _of(keys: Array, obstacles: list[int]) -> Array:
     return np.asarray(((lower & SURFACE) != 0) & np.isin((lower & LOST) - FIRST_OBSTACLE, obstacles))
 
 
-def _counted(told: Told) -> tuple[Array, Array]:
+def _counted(recorded: RecordedEvents) -> tuple[Array, Array]:
     """Sorted keys of contacts that bounced, and the number of bounces."""
-    bounced = np.flatnonzero(told.bounces)
-    keys, where = np.unique(told.keys[bounced], return_inverse=True)
-    return keys, np.bincount(where, told.bounces[bounced], len(keys)).astype(np.int64)
+    bounced = np.flatnonzero(recorded.bounces)
+    keys, where = np.unique(recorded.keys[bounced], return_inverse=True)
+    return keys, np.bincount(where, recorded.bounces[bounced], len(keys)).astype(np.int64)
 
 
 def renumber(records: Array, now: Array) -> None:
@@ -357,17 +357,17 @@ def _among(keys: Array, others: Array) -> Array:
     return np.asarray(others[where] == keys)
 
 
-def _told_of(keys: Array, told: Told) -> tuple[Array, Array]:
+def _sums_of(keys: Array, recorded: RecordedEvents) -> tuple[Array, Array]:
     """The largest speed and the sum of pushes of each of the sorted keys; 0 without records."""
     speeds, pushes = np.zeros((2, len(keys)))
     if len(keys):
-        asked = np.zeros(int(max(told.keys.max(initial=0), keys[-1]) >> 32) + 1, bool)
+        asked = np.zeros(int(max(recorded.keys.max(initial=0), keys[-1]) >> 32) + 1, bool)
         asked[keys >> 32] = True
-        which = np.flatnonzero(asked[told.keys >> 32])  # usually few of many contacts begin
-        which = which[_among(told.keys[which], keys)]
-        where = np.searchsorted(keys, told.keys[which])
-        np.maximum.at(speeds, where, told.speeds[which])
-        np.add.at(pushes, where, told.pushes[which])
+        which = np.flatnonzero(asked[recorded.keys >> 32])  # usually few of many contacts begin
+        which = which[_among(recorded.keys[which], keys)]
+        where = np.searchsorted(keys, recorded.keys[which])
+        np.maximum.at(speeds, where, recorded.speeds[which])
+        np.add.at(pushes, where, recorded.pushes[which])
     return speeds, pushes
 
 

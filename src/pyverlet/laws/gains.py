@@ -8,11 +8,11 @@ from typing import Any
 
 import numpy as np
 
+from pyverlet.common.arrays import Array
+from pyverlet.common.constants import SURPLUS
 from pyverlet.core import unit
-from pyverlet.ground.arrays import Array
-from pyverlet.ground.constants import SURPLUS
 from pyverlet.laws.forces import Drag, has_potential
-from pyverlet.state.slots import Slots
+from pyverlet.state.sorted_state import SortedState
 from pyverlet.state.state import State, spin_radius
 
 Listed = tuple[Array, Array, Array, Array]
@@ -35,7 +35,7 @@ TO_PART = 0.1
 
 def gained(world: Any) -> float:
     """Energy that a frame under gravity alone has added, J, without that of pinned and sleeping particles."""
-    particles = world._slots
+    particles = world._sorted
     then, now = body_of(world._state), body_of(particles)
     if len(particles.island) and 2 * len(particles.free) < len(particles):  # sleepers have gained nothing
         order = particles.particle[particles.free]
@@ -44,21 +44,21 @@ def gained(world: Any) -> float:
     return more
 
 
-def body_of(of: State | Slots) -> tuple[Array, ...]:
+def body_of(of: State | SortedState) -> tuple[Array, ...]:
     """The arrays from which energies are computed."""
-    position, velocity, spin, inertia, radius, mass = _measured(vars(of) if isinstance(of, Slots) else of.shown)
+    position, velocity, spin, inertia, radius, mass = _measured(vars(of) if isinstance(of, SortedState) else of.shown)
     return position, velocity, spin, spin_radius(inertia, radius, mass), mass
 
 
 def most_gained(world: Any) -> float:
     """The energy that a frame may gain, J."""
-    return SURPLUS * fall(world._slots.total_mass, world.gravity, world.boundary.extent())
+    return SURPLUS * fall(world._sorted.total_mass, world.gravity, world.boundary.extent())
 
 
 def gained_much(world: Any) -> bool:
     """Whether a frame under gravity alone has gained enough to be examined."""
     more, most = gained(world), most_gained(world)
-    return more > most * TO_PART and (more > most or bool(world._slots.placed.any()))
+    return more > most * TO_PART and (more > most or bool(world._sorted.placed.any()))
 
 
 def fall(mass: float, gravity: tuple[float, float], extent: Extent | None) -> float:
@@ -69,17 +69,17 @@ def fall(mass: float, gravity: tuple[float, float], extent: Extent | None) -> fl
     return mass * (abs(gx) * (extent[2] - extent[0]) + abs(gy) * (extent[3] - extent[1]))
 
 
-def rounding(slots: Slots, pulled: Sequence[State | Slots]) -> float:
+def rounding(state: SortedState, pulled: Sequence[State | SortedState]) -> float:
     """Energy below which gains are rounding errors, J, from the error of the largest coordinate.
 
     It is the kinetic energy of such an error in 1/60 s, plus its work along the accelerations of each of `pulled`. That work may
     have either sign: removing it would slow springs far from the origin.
     """
-    error, work = float(np.finfo(slots.dtype).eps) * float(np.abs(slots.position).max(initial=0.0)), 0.0
+    error, work = float(np.finfo(state.dtype).eps) * float(np.abs(state.position).max(initial=0.0)), 0.0
     for now in pulled:
         free = np.isfinite(now.mass)
         work += float(np.nansum(now.mass[free] * np.hypot(*now.acceleration[free].T)))
-    return 0.5 * slots.total_mass * (60.0 * error) ** 2 + _ROUNDED_WORK * error * work
+    return 0.5 * state.total_mass * (60.0 * error) ** 2 + _ROUNDED_WORK * error * work
 
 
 def undriven(world: Any) -> bool:
@@ -89,39 +89,41 @@ def undriven(world: Any) -> bool:
     pinned circle moves, gravity has no component along a period, and the integrator is of order 2 or more, so that it does not
     raise the energy either.
     """
-    room = world.boundary
-    if world.integrator.order < 2 or room.moves or world.links.pool.drives:
+    boundary = world.boundary
+    if world.integrator.order < 2 or boundary.moves or world.links.pool.drives:
         return False
-    if world._slots.pins and pinned_move(world._slots):
+    if world._sorted.pins and pinned_move(world._sorted):
         return False
-    seam = room.seam
-    if seam and any(g != 0 and period > 0 for g, period in zip(world.gravity, seam.period, strict=True)):
+    periodic = boundary.periodic
+    if periodic and any(g != 0 and period > 0 for g, period in zip(world.gravity, periodic.period, strict=True)):
         return False  # an endless fall gains energy for ever
     if world.forces and not all(type(force) is Drag or has_potential(force) for force in world.forces):
         return False
     return not world._obstacle_arrays.drives
 
 
-def pinned_move(state: State | Slots) -> bool:
+def pinned_move(state: State | SortedState) -> bool:
     """Whether pinned particles move, and push others: nothing stops them."""
     return bool(unit("engine", state.mass.dtype).pinned_move(state.mass, state.velocity, state.spin))
 
 
-def to_part(slots: Slots, position: Array, listed: Listed, heap: Array, weight: Array, gravity: tuple[float, float]) -> float:
+def to_part(
+    state: SortedState, position: Array, listed: Listed, heap: Array, weight: Array, gravity: tuple[float, float]
+) -> float:
     """Energy that circles which the user has placed inside each other may gain, J.
 
-    position: (n, 2) m, where they were placed. heap: (n,) lowest slot of the heap of each. weight: (n,) N.
+    position: (n, 2) m, where they were placed. heap: (n,) lowest row of the heap of each. weight: (n,) N.
     """
     first, count, i, j = listed
     at = np.repeat(first - np.cumsum(count) + count, count) + np.arange(count.sum())
     pairs = np.unique(np.sort(np.column_stack((i[at], j[at])), axis=1), axis=0)
-    a, b = pairs[slots.placed[pairs].any(axis=1)].T
-    near = np.hypot(*slots.seam.nearest(position[b] - position[a]).T) < (1.0 - DEEP) * (slots.radius[a] + slots.radius[b])
-    overlapped, fallen = np.bincount(np.concatenate((a[near], b[near])), minlength=len(slots)), position @ gravity  # J/kg
+    a, b = pairs[state.placed[pairs].any(axis=1)].T
+    near = np.hypot(*state.periodic.nearest(position[b] - position[a]).T) < (1.0 - DEEP) * (state.radius[a] + state.radius[b])
+    overlapped, fallen = np.bincount(np.concatenate((a[near], b[near])), minlength=len(state)), position @ gravity  # J/kg
     top = fallen.copy()
     np.minimum.at(top, heap, fallen)
-    mass = np.where(slots.inverse_mass > 0, slots.mass, 0.0).astype(float)
-    lift = mass * (fallen - top[heap]) + _RISE * weight * slots.radius * np.sqrt(overlapped)
+    mass = np.where(state.inverse_mass > 0, state.mass, 0.0).astype(float)
+    lift = mass * (fallen - top[heap]) + _RISE * weight * state.radius * np.sqrt(overlapped)
     return float(lift[overlapped > 0].sum())
 
 

@@ -17,8 +17,8 @@ from typing import ClassVar, Protocol
 import numpy as np
 
 from pyverlet import core
-from pyverlet.ground.arrays import Array
-from pyverlet.state.slots import Slots
+from pyverlet.common.arrays import Array
+from pyverlet.state.sorted_state import SortedState
 
 LEAST_PASSES, MOST_PASSES = 2, 8
 """Bounds on evaluations of velocity-dependent functions per step: two if they change little with velocity, a few more if they are
@@ -36,7 +36,7 @@ class Forces(Protocol):
     def functions(self) -> bool:
         """Whether user-defined forces do; these are evaluated until they see the velocity that they lead to."""
 
-    def __call__(self, state: Slots, t: float) -> None:
+    def __call__(self, state: SortedState, t: float) -> None:
         """Evaluate the accelerations."""
 
 
@@ -58,17 +58,17 @@ class Integrator(ABC):
     follows: ClassVar[float] = np.inf
     velocity_lag: ClassVar[float] = 0.0
 
-    def begin(self, state: Slots, forces: Forces, t: float, h: float, h_last: float | None) -> None:
+    def begin(self, state: SortedState, forces: Forces, t: float, h: float, h_last: float | None) -> None:
         """Prepare a step of h seconds; the velocity is at the time of the position. `h_last`: the last step, or None."""
 
     @abstractmethod
-    def step(self, state: Slots, forces: Forces, t: float, h: float) -> None:
+    def step(self, state: SortedState, forces: Forces, t: float, h: float) -> None:
         """Advance `state.position` and `state.velocity` from t to t + h."""
 
-    def end(self, state: Slots, forces: Forces, t: float, h: float) -> None:
+    def end(self, state: SortedState, forces: Forces, t: float, h: float) -> None:
         """Finish the step, at time t: bring the velocity to the time of the position."""
 
-    def full_step(self, state: Slots, forces: Forces, t: float, h: float, h_last: float | None = None) -> None:
+    def full_step(self, state: SortedState, forces: Forces, t: float, h: float, h_last: float | None = None) -> None:
         """A whole step, from and to a velocity at the time of the position."""
         self.begin(state, forces, t, h, h_last)
         self.step(state, forces, t, h)
@@ -93,7 +93,7 @@ def advance(out: Array, base: Array, slope: Array, h: float) -> None:
     core.unit("motion", out.dtype).advance(out, base, slope, h)
 
 
-def solve_velocity(state: Slots, forces: Forces, t: float, base: Array, ahead: float) -> None:
+def solve_velocity(state: SortedState, forces: Forces, t: float, base: Array, ahead: float) -> None:
     """Solve for `state.velocity` v = base + ahead a(v), starting from the given one, and for `state.acceleration` a.
 
     With v in the middle of a kick, forces perpendicular to it do no work, and drag has its terminal speed, however strong.
@@ -105,15 +105,15 @@ def solve_velocity(state: Slots, forces: Forces, t: float, base: Array, ahead: f
             break
 
 
-def _drift(state: Slots, h: float) -> None:
+def _drift(state: SortedState, h: float) -> None:
     advance(state.position, state.position, state.velocity, h)
 
 
-def _kick(state: Slots, h: float) -> None:
+def _kick(state: SortedState, h: float) -> None:
     advance(state.velocity, state.velocity, state.acceleration, h)
 
 
-def _swap_acceleration(state: Slots) -> None:
+def _swap_acceleration(state: SortedState) -> None:
     """Keep the acceleration as scratch 0 and let the next evaluation write to another array."""
     spare = state.scratch(0)
     state._scratch[0], state.acceleration = state.acceleration, spare
@@ -130,7 +130,7 @@ class ExplicitEuler(Integrator):
     symplectic = False
     follows = 0.01
 
-    def step(self, state: Slots, forces: Forces, t: float, h: float) -> None:
+    def step(self, state: SortedState, forces: Forces, t: float, h: float) -> None:
         forces(state, t)
         _drift(state, h)
         _kick(state, h)
@@ -148,7 +148,7 @@ class SemiImplicitEuler(Integrator):
     symplectic = True
     follows = 0.01
 
-    def step(self, state: Slots, forces: Forces, t: float, h: float) -> None:
+    def step(self, state: SortedState, forces: Forces, t: float, h: float) -> None:
         forces(state, t)
         _kick(state, h)
         _drift(state, h)
@@ -178,7 +178,7 @@ class _Stormer(Integrator):
     def label(self) -> str:
         return self.name() + (", naive start" if self.naive_start else "")
 
-    def begin(self, state: Slots, forces: Forces, t: float, h: float, h_last: float | None) -> None:
+    def begin(self, state: SortedState, forces: Forces, t: float, h: float, h_last: float | None) -> None:
         # x_prev = x - v h + a h^2 / 2 makes u = v - a h / 2: order 2. The naive x_prev = x - v h makes u = v: order 1.
         if h_last is None and not self.naive_start:
             forces(state, t)
@@ -186,17 +186,17 @@ class _Stormer(Integrator):
             state.acceleration.fill(0)
         advance(state.velocity, state.velocity, state.acceleration, -0.5 * (h if h_last is None else h_last))
 
-    def step(self, state: Slots, forces: Forces, t: float, h: float) -> None:
+    def step(self, state: SortedState, forces: Forces, t: float, h: float) -> None:
         self._evaluate(state, forces, t, h)
         _kick(state, h)
         _drift(state, h)
 
-    def end(self, state: Slots, forces: Forces, t: float, h: float) -> None:
+    def end(self, state: SortedState, forces: Forces, t: float, h: float) -> None:
         self._evaluate(state, forces, t, h)
         _kick(state, 0.5 * h)
 
     @staticmethod
-    def _evaluate(state: Slots, forces: Forces, t: float, h: float) -> None:
+    def _evaluate(state: SortedState, forces: Forces, t: float, h: float) -> None:
         """Evaluate forces; velocity-dependent ones get the velocity at time t, not the one half a substep earlier."""
         if not forces.velocity_dependent:
             forces(state, t)
@@ -222,7 +222,7 @@ class PositionVerlet(_Stormer):
         naive_start: start from x_prev = x - v h instead of x - v h + a h^2 / 2. Reduces the global order to 1; for demonstration.
     """
 
-    def begin(self, state: Slots, forces: Forces, t: float, h: float, h_last: float | None) -> None:
+    def begin(self, state: SortedState, forces: Forces, t: float, h: float, h_last: float | None) -> None:
         super().begin(state, forces, t, h, h_last)
         if h_last is not None and h_last != h:
             state.velocity *= h_last / h  # x - x_prev is kept when the step changes: the error of this method, shown on purpose
@@ -234,7 +234,7 @@ class TimeCorrectedVerlet(_Stormer):
     With a constant step it is PositionVerlet, bit for bit.
     """
 
-    def begin(self, state: Slots, forces: Forces, t: float, h: float, h_last: float | None) -> None:
+    def begin(self, state: SortedState, forces: Forces, t: float, h: float, h_last: float | None) -> None:
         if h_last in (None, h):
             super().begin(state, forces, t, h, h_last)
             return
@@ -258,7 +258,7 @@ class VelocityVerlet(Integrator):
     order = 2
     symplectic = True
 
-    def step(self, state: Slots, forces: Forces, t: float, h: float) -> None:
+    def step(self, state: SortedState, forces: Forces, t: float, h: float) -> None:
         forces(state, t)
         _drift(state, h)
         advance(state.position, state.position, state.acceleration, 0.5 * h * h)
@@ -284,7 +284,7 @@ class RK4(Integrator):
     symplectic = False
     follows = 0.25
 
-    def step(self, state: Slots, forces: Forces, t: float, h: float) -> None:
+    def step(self, state: SortedState, forces: Forces, t: float, h: float) -> None:
         x0, v0, x_sum, v_sum = (state.scratch(k) for k in range(4))
         for start, current in ((x0, state.position), (v0, state.velocity), (x_sum, state.position), (v_sum, state.velocity)):
             start[:] = current
@@ -312,7 +312,7 @@ class Yoshida4(Integrator):
     _W1: ClassVar[float] = 1.0 / (2.0 - 2.0 ** (1.0 / 3.0))
     _W0: ClassVar[float] = 1.0 - 2.0 * _W1
 
-    def step(self, state: Slots, forces: Forces, t: float, h: float) -> None:
+    def step(self, state: SortedState, forces: Forces, t: float, h: float) -> None:
         for weight in (self._W1, self._W0, self._W1):
             part = weight * h
             _drift(state, 0.5 * part)
@@ -321,7 +321,7 @@ class Yoshida4(Integrator):
             t += part
 
     @staticmethod
-    def _symmetric_kick(state: Slots, forces: Forces, t: float, h: float) -> None:
+    def _symmetric_kick(state: SortedState, forces: Forces, t: float, h: float) -> None:
         if not forces.velocity_dependent:
             forces(state, t)
             _kick(state, h)

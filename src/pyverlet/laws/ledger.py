@@ -8,10 +8,10 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from pyverlet.ground.shown import line
+from pyverlet.common.shown import line
 from pyverlet.laws.forces import has_potential, soften
 from pyverlet.laws.links import Links
-from pyverlet.state.slots import Slots
+from pyverlet.state.sorted_state import SortedState
 from pyverlet.state.state import spin_radius
 
 
@@ -91,7 +91,7 @@ class EnergyLedger:
         return other
 
 
-class Page:
+class FrameLedger:
     """The ledger of one frame; called at the end of each stage, and passes the calls on to the profile.
 
     Energy changes by contacts are recorded by the core (`core.work`); the work of forces without a potential is summed by the
@@ -101,13 +101,13 @@ class Page:
 
     def __init__(self, world: Any) -> None:
         self._energy_ledger: EnergyLedger = world._energy_ledger
-        self._state: Slots = world._slots
+        self._state: SortedState = world._sorted
         self._links: Links = world.links
-        self._done: Callable[[str], None] = world.profile.mark
+        self._on_stage_end: Callable[[str], None] = world.profile.mark
         self._gravity, self._t, forces, kept = world.gravity, world.time, world._force_sum, self._energy_ledger
         self._holding = [force for force in forces.forces if has_potential(force)]
         self._working = [force for force in forces.forces if hasattr(force, "dissipate") or not has_potential(force)]
-        self._open, self._held = Ledger(**vars(kept.ledger)), kept._held
+        self._entries, self._held = Ledger(**vars(kept.ledger)), kept._held
         self._now = _Instant(0.0, {})
         self._begun = self._risen = 0.0  # J at the start of the frame; by crossing the periodic boundary at its end
         self._engine: Any = None
@@ -115,22 +115,22 @@ class Page:
         self._sums = [0.0] * 6
 
     def __call__(self, stage: str) -> None:
-        self._done(stage)
+        self._on_stage_end(stage)
         if stage == "gather":
             self._now = self._look(0.0)
-            self._begun, risen = self._now.energy, self._beyond_seam()
-            self._open.outside += self._begun - risen - self._energy_ledger._energy
-            self._open.seam += risen
+            self._begun, risen = self._now.energy, self._lifted_by_wrapping()
+            self._entries.outside += self._begun - risen - self._energy_ledger._energy
+            self._entries.seam += risen
         elif stage == "finish":
-            self._now, self._risen = self._look(0.0, works=False), self._beyond_seam()
-            self._open.residual += self._now.energy - self._begun
+            self._now, self._risen = self._look(0.0, works=False), self._lifted_by_wrapping()
+            self._entries.residual += self._now.energy - self._begun
         else:
             return
-        self._done("ledger")
+        self._on_stage_end("ledger")
 
     def begin(self, engine: Any, share: float) -> None:
         """Start of the substeps; velocities contain `share` of the last contact impulses."""
-        engine.book(True)
+        engine.record_work(True)
         # Tangential parts as the last frame found them, since contact lists may have been remade.
         friction, rolled, driven = self._held if share else (0.0, 0.0, 0.0)
         self._engine, self._sums = engine, [0.0, -friction, -rolled, 0.0, -driven, -engine.energy_of_last(share)[0]]
@@ -150,8 +150,8 @@ class Page:
 
     def gained(self, account: str, joules: float) -> None:
         """Book energy given between two substeps."""
-        setattr(self._open, account, getattr(self._open, account) + joules)
-        self._open.residual -= joules
+        setattr(self._entries, account, getattr(self._entries, account) + joules)
+        self._entries.residual -= joules
 
     def _work(self, power: dict[str, float], before: float, after: float) -> None:
         """Book work for so many seconds at the previous power, and at the current one."""
@@ -169,33 +169,33 @@ class Page:
         """End of the substeps; velocities are current, with `share` of the last contact impulses."""
         whole, *held = self._engine.energy_of_last(share)
         self._held = resting, rolled, driven = tuple(held)
-        (impacts, friction, walls, places, rolling, motors), contacts = self._engine.book(False)
+        (impacts, friction, walls, places, rolling, motors), contacts = self._engine.record_work(False)
         more = impacts, friction + resting, rolling + rolled, walls, motors + driven, contacts + places + whole
         self._sums = [had + now for had, now in zip(self._sums, more, strict=True)]
 
     def close(self, limiter: float) -> None:
         """Close the page after a successful frame; limiter: J by the energy limiter, negative."""
         impacts, friction, rolling, walls, motors, contacts = self._sums
-        rest, page = contacts - impacts - friction - rolling - walls - motors, self._open
-        page.restitution += impacts + min(rest, 0.0)
-        page.friction += friction
-        page.rolling += rolling
-        page.projection += max(rest, 0.0)
-        page.walls += walls
-        page.motors += motors
-        page.limiter += limiter
-        page.residual -= contacts + limiter
-        page.seam -= self._risen
-        self._energy_ledger.ledger = page
+        rest, entries = contacts - impacts - friction - rolling - walls - motors, self._entries
+        entries.restitution += impacts + min(rest, 0.0)
+        entries.friction += friction
+        entries.rolling += rolling
+        entries.projection += max(rest, 0.0)
+        entries.walls += walls
+        entries.motors += motors
+        entries.limiter += limiter
+        entries.residual -= contacts + limiter
+        entries.seam -= self._risen
+        self._energy_ledger.ledger = entries
         self._energy_ledger._energy, self._energy_ledger._held = self._now.energy - self._risen, self._held
 
-    def _beyond_seam(self) -> float:
+    def _lifted_by_wrapping(self) -> float:
         """Potential energy of particles relative to their images inside a periodic room, J."""
         s = self._state
-        if not s.seam or not ((g := np.array(self._gravity)) * s.seam.period).any():
+        if not s.periodic or not ((g := np.array(self._gravity)) * s.periodic.period).any():
             return 0.0
         free = np.isfinite(s.mass)
-        beyond = s.position[free].astype(float) - s.seam.wrapped(s.position[free])
+        beyond = s.position[free].astype(float) - s.periodic.wrapped(s.position[free])
         return -float(s.mass[free].astype(float) @ (beyond @ g))
 
     def _look(self, lag: float, *, works: bool = True) -> _Instant:
@@ -207,7 +207,7 @@ class Page:
         held = self._links.energy(s.where()) if self._links and self._links.pool.gives else 0.0
         if self._holding:
             state = s.in_users_order()
-            state.seam.wrap(state.position)  # as they will be: rounded anew
+            state.periodic.wrap(state.position)  # as they will be: rounded anew
             held += sum(force.potential(state) for force in self._holding)
         return _Instant(energy + held, self._power(lag) if works and self._working else {})
 

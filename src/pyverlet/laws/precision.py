@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from pyverlet.ground.errors import CoarseCoordinatesWarning
+from pyverlet.common.errors import CoarseCoordinatesWarning
 
 FRAMES = 20
 """Frames between checks."""
@@ -19,7 +19,7 @@ TREMBLE = 0.03
 ROUGH = 0.02
 """Largest rounding of coordinates of touching circles, over the radius."""
 
-ASTRAY, MOVES = 0.05, 0.05
+DRIFT, MOVES = 0.05, 0.05
 """Largest deviation by rounding between two checks, over the distance moved; and the distance that counts as motion, in radii."""
 
 
@@ -35,11 +35,11 @@ def fine_up_to(state: Any, gravity: float, h: float, substeps: int) -> float:
     if state.dtype != np.float32 or not len(state.radius):
         return np.inf
     least = state.radius.min(keepdims=True)
-    moves = ASTRAY * MOVES * float(least[0]) / (FRAMES * substeps * float(np.finfo(state.dtype).eps))
+    moves = DRIFT * MOVES * float(least[0]) / (FRAMES * substeps * float(np.finfo(state.dtype).eps))
     return min(float(precise_up_to(least, gravity, h, state.dtype)[0]), np.inf if gravity else moves)
 
 
-def _astray(known: dict[str, NDArray[Any]], h: float, count: int) -> NDArray[np.float64]:
+def _drift(known: dict[str, NDArray[Any]], h: float, count: int) -> NDArray[np.float64]:
     """(n,) deviation of moving particles by rounding in so many substeps of h seconds, over what ASTRAY allows.
 
     In steady motion all rounding errors are equal, in accelerated motion they are random.
@@ -49,7 +49,7 @@ def _astray(known: dict[str, NDArray[Any]], h: float, count: int) -> NDArray[np.
     rounded = np.abs(np.rint(way / spacing) * spacing - way)
     error = np.hypot(*np.where(evenly, count * rounded, spacing * np.sqrt(count / 12.0)).T)
     whole = count * np.hypot(*way.T)  # a fast fall may have a slow sideways drift
-    return np.asarray(np.divide(error, ASTRAY * whole, out=np.zeros_like(error), where=whole > MOVES * known["radius"]))
+    return np.asarray(np.divide(error, DRIFT * whole, out=np.zeros_like(error), where=whole > MOVES * known["radius"]))
 
 
 class Precision:
@@ -80,8 +80,8 @@ class Precision:
         at_rest = precise_up_to(known["radius"], gravity, h, world.dtype)
         touching = precise_up_to(known["radius"], 0.0, h, world.dtype) if world.collisions else np.full(len(where), np.inf)
         # Under gravity slow particles lie in a heap, where contacts correct them.
-        astray = np.zeros(len(world)) if gravity else _astray(known, h, FRAMES * world.substeps)
-        moving = where / np.maximum(astray, 1e-300)
+        drift = np.zeros(len(world)) if gravity else _drift(known, h, FRAMES * world.substeps)
+        moving = where / np.maximum(drift, 1e-300)
         for does, limit, which in (("rests", at_rest, rests), ("moves", moving, ~rests), ("may touch others", touching, ~rests)):
             self._warn(does, where, limit, which & free & (where > limit), known["radius"])
 

@@ -12,11 +12,11 @@ from typing import Any
 
 import numpy as np
 
-from pyverlet.ground.arrays import Array
-from pyverlet.ground.constants import SLEEP_AFTER_S, SLEEP_NEAR, SLEEP_SPEED
+from pyverlet.common.arrays import Array
+from pyverlet.common.constants import SLEEP_AFTER_S, SLEEP_NEAR, SLEEP_SPEED
+from pyverlet.laws.boundaries import Boundary
 from pyverlet.laws.forces import Drag
-from pyverlet.laws.rooms import Boundary
-from pyverlet.state.slots import Slots
+from pyverlet.state.sorted_state import SortedState
 from pyverlet.state.state import MARKS, ROWS, SET, State
 
 _OF_PINNED = ("number", *ROWS[:2], *SET, *MARKS)
@@ -27,7 +27,7 @@ OTHER_LAWS = ((), ())
 
 
 class Sleep:
-    """Puts islands of one world to sleep and wakes them. `Slots.island` has the number of a sleeper's island, or -1 if awake."""
+    """Puts islands of one world to sleep and wakes them. `SortedState.island` has the number of a sleeper's island; -1: awake."""
 
     def __init__(self) -> None:
         self._next = 0  # number of the next island
@@ -50,9 +50,9 @@ class Sleep:
         if laws and other._laws and laws[:-1] == other._laws[:-1]:
             self._laws = laws
 
-    def begin(self, slots: Slots, state: State, laws: Any) -> bool:
-        """Prepare a new frame, before slots gather the state. Returns whether any particle woke."""
-        changed, pinned = any(slots.look(state)) or slots.is_new, self._pinned
+    def begin(self, sorted_state: SortedState, state: State, laws: Any) -> bool:
+        """Prepare a new frame, before rows gather the state. Returns whether any particle woke."""
+        changed, pinned = any(sorted_state.look(state)) or sorted_state.is_new, self._pinned
         if changed or not self._stands:
             pinned = _pinned(state)
             self._stands = not np.frombuffer(pinned[2], np.uint8).any()  # their velocities
@@ -61,64 +61,74 @@ class Sleep:
         if not self._members:
             return False
         if not same:
-            return self._wake(slots, slots.island >= 0)
+            return self._wake(sorted_state, sorted_state.island >= 0)
         if not changed:
             return False
-        edited = slots.edited(state) & (slots.island >= 0)
-        if slots.is_new:  # some have been removed
-            number, left = np.unique(slots.island, return_counts=True)
+        edited = sorted_state.edited(state) & (sorted_state.island >= 0)
+        if sorted_state.is_new:  # some have been removed
+            number, left = np.unique(sorted_state.island, return_counts=True)
             fewer = [k for k, n in zip(number.tolist(), left.tolist(), strict=True) if n != self._members.get(k, n)]
-            edited |= np.isin(slots.island, fewer)
-        return bool(edited.any()) and self.wake(slots, edited)
+            edited |= np.isin(sorted_state.island, fewer)
+        return bool(edited.any()) and self.wake(sorted_state, edited)
 
     @property
     def anyone(self) -> bool:
         """Whether any particle sleeps."""
         return len(self._members) > 0
 
-    def all_asleep(self, slots: Slots) -> bool:
+    def all_asleep(self, sorted_state: SortedState) -> bool:
         """Whether nothing can move."""
-        return self.anyone and not len(slots.free)
+        return self.anyone and not len(sorted_state.free)
 
-    def wake(self, slots: Slots, touched: Array) -> bool:
+    def wake(self, sorted_state: SortedState, touched: Array) -> bool:
         """Wake islands with a touched particle: (n,) 1. Returns whether there were any: then the list lacks pairs."""
-        return self._wake(slots, np.isin(slots.island, slots.island[(touched == 1) & (slots.island >= 0)]))
+        return self._wake(
+            sorted_state, np.isin(sorted_state.island, sorted_state.island[(touched == 1) & (sorted_state.island >= 0)])
+        )
 
-    def end(self, slots: Slots, begun: Array, pairs: tuple[Array, ...], dt: float, gravity: float) -> bool:
+    def end(self, sorted_state: SortedState, begun: Array, pairs: tuple[Array, ...], dt: float, gravity: float) -> bool:
         """At the end of a frame of dt seconds: put islands at rest long enough to sleep. Returns whether there were any.
 
         begun: (n, 2) m, the user's positions at its start: separating circles move, although their velocities are 0.
         pairs: (first, count, i, j), those closer than a skin; those of row s are count[s] from first[s] on.
         """
-        awake = (slots.velocity, slots.spin, slots.radius, slots.free)
-        tired = slots.motion.time_at_rest(*awake, SLEEP_SPEED**2 * gravity, dt, SLEEP_AFTER_S, slots.calm)
-        if self._laws is None or not tired:
+        awake = (sorted_state.velocity, sorted_state.spin, sorted_state.radius, sorted_state.free)
+        long_at_rest = sorted_state.motion.time_at_rest(
+            *awake, SLEEP_SPEED**2 * gravity, dt, SLEEP_AFTER_S, sorted_state.sleep_timer
+        )
+        if self._laws is None or not long_at_rest:
             return False
-        way = slots.seam.nearest(slots.position - begun[slots.particle])
-        slots.calm[(way**2).sum(axis=1) > (0.4 * SLEEP_SPEED * dt) ** 2 * gravity * slots.radius] = 0
-        root = np.empty(len(slots), np.int64)
-        bodies = (slots.position, slots.radius, *slots.seam.period, slots.inverse_mass, slots.calm)
-        slots.motion.find_islands(*bodies, pairs, SLEEP_NEAR, SLEEP_AFTER_S, root)
+        way = sorted_state.periodic.nearest(sorted_state.position - begun[sorted_state.particle])
+        sorted_state.sleep_timer[(way**2).sum(axis=1) > (0.4 * SLEEP_SPEED * dt) ** 2 * gravity * sorted_state.radius] = 0
+        root = np.empty(len(sorted_state), np.int64)
+        bodies = (
+            sorted_state.position,
+            sorted_state.radius,
+            *sorted_state.periodic.period,
+            sorted_state.inverse_mass,
+            sorted_state.sleep_timer,
+        )
+        sorted_state.motion.find_islands(*bodies, pairs, SLEEP_NEAR, SLEEP_AFTER_S, root)
         sleeper = root >= 0
         if not sleeper.any():
             return False
-        slots.island[sleeper] = self._next + root[sleeper]
-        self._next += len(slots)
-        number, members = np.unique(slots.island[sleeper], return_counts=True)
+        sorted_state.island[sleeper] = self._next + root[sleeper]
+        self._next += len(sorted_state)
+        number, members = np.unique(sorted_state.island[sleeper], return_counts=True)
         self._members |= dict(zip(number.tolist(), members.tolist(), strict=True))
-        for array in (slots.velocity, slots.acceleration, slots.spin):
+        for array in (sorted_state.velocity, sorted_state.acceleration, sorted_state.spin):
             array[sleeper] = 0
-        slots.update_inverse_mass()
+        sorted_state.update_inverse_mass()
         return True
 
-    def _wake(self, slots: Slots, who: Array) -> bool:
-        if not who.any():
+    def _wake(self, sorted_state: SortedState, which: Array) -> bool:
+        if not which.any():
             return False
-        for island in np.unique(slots.island[who]):
+        for island in np.unique(sorted_state.island[which]):
             del self._members[int(island)]
-        slots.island[who] = -1
-        slots.calm[who] = 0
-        slots.update_inverse_mass()
+        sorted_state.island[which] = -1
+        sorted_state.sleep_timer[which] = 0
+        sorted_state.update_inverse_mass()
         return True
 
 
@@ -132,8 +142,8 @@ def laws(world: Any) -> Any:
     if world.links or moving or not all(type(force) is Drag for force in world.forces):
         return None
     rules = list(map(repr, world._rules))
-    room, solids = world.boundary, world._obstacle_arrays.solid_version
-    return world.gravity, _facts(room), room.extent(), world.collisions, rules, solids
+    boundary, solids = world.boundary, world._obstacle_arrays.solid_version
+    return world.gravity, _facts(boundary), boundary.extent(), world.collisions, rules, solids
 
 
 def _facts(boundary: Boundary) -> tuple[type, str]:

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any, TypedDict
 
-from pyverlet.ground import checks
-from pyverlet.ground.checked import Checked
-from pyverlet.ground.errors import InputError
+from pyverlet.common import checks
+from pyverlet.common.checked import Checked
+from pyverlet.common.errors import InputError
 from pyverlet.state.state import EVERYONE
 
 

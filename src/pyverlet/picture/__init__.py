@@ -3,7 +3,7 @@
 Loads only NumPy and the engine.
 """
 
-from pyverlet.ground.submodules import lazily
+from pyverlet.common.submodules import lazily
 from pyverlet.picture.colour import DARK, LIGHT, ByEnergy, ByMass, ByOrigin, BySpeed, Colouring, Fixed, Groups, Theme
 from pyverlet.picture.pen import Pen
 from pyverlet.picture.raster import Raster

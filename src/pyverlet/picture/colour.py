@@ -12,9 +12,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from pyverlet.ground import checks
-from pyverlet.ground.errors import InputError
-from pyverlet.ground.shown import Shown
+from pyverlet.common import checks
+from pyverlet.common.errors import InputError
+from pyverlet.common.shown import Shown
 from pyverlet.state.group import Group, check_home, members
 from pyverlet.world.world import World
 

@@ -8,9 +8,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from pyverlet.ground import checks
-from pyverlet.ground.errors import InputError
-from pyverlet.ground.shown import Shown
+from pyverlet.common import checks
+from pyverlet.common.errors import InputError
+from pyverlet.common.shown import Shown
 from pyverlet.world.world import World
 
 MOST_POINTS = 50_000  # in a drawing, which is sent with each picture

@@ -8,11 +8,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from pyverlet.common import checks
+from pyverlet.common.errors import InputError
+from pyverlet.common.outside import require
+from pyverlet.common.shown import Shown
 from pyverlet.core import unit
-from pyverlet.ground import checks
-from pyverlet.ground.errors import InputError
-from pyverlet.ground.outside import require
-from pyverlet.ground.shown import Shown
 from pyverlet.laws.obstacles import Outline
 from pyverlet.picture import periodic_images
 from pyverlet.picture.colour import DARK, Packed, Theme, by_force, swapped
@@ -46,7 +46,7 @@ class Raster(Shown):
         self._pixels: Packed = np.empty((height, width), dtype=np.uint32)
         self._floor: Packed = np.empty_like(self._pixels)
         self._floor_is: Any = None
-        self._ground: Packed = np.empty_like(self._pixels)
+        self._background: Packed = np.empty_like(self._pixels)
         self._obstacles: Any = None
 
     def draw(
@@ -65,9 +65,9 @@ class Raster(Shown):
             (height, width, 4) bytes R, G, B, A: a view of the buffer, valid until the next call. A is the part of a pixel that
             circles cover; R, G, B are complete without it.
         """
-        obstacles, seam = world.obstacles.outlines(), world.boundary.seam
-        if seam:
-            obstacles = periodic_images.outlines(obstacles, seam)
+        obstacles, periodic = world.obstacles.outlines(), world.boundary.periodic
+        if periodic:
+            obstacles = periodic_images.outlines(obstacles, periodic)
         position, radius, angle, colours = periodic_images.circles(world, colours)
         picture = self.discs(
             position, radius, view,
@@ -93,13 +93,13 @@ class Raster(Shown):
             self._lay_floor(view, outlines)
             self._floor_is, self._obstacles = key, None
         if self._obstacles is not obstacles:
-            np.copyto(self._ground, self._floor)
+            np.copyto(self._background, self._floor)
             self._place(obstacles, view)
             self._obstacles = obstacles
-        np.copyto(self._pixels, self._ground)
+        np.copyto(self._pixels, self._background)
         colours = np.ascontiguousarray(colours, dtype=np.uint32)
         lines = links and (links[0], by_force(links[1], self.theme))
-        paint(self._pixels, self._ground, position, radius, angle, colours, lines, view)
+        paint(self._pixels, self._background, position, radius, angle, colours, lines, view)
         return self._pixels.view(np.uint8).reshape(*self._pixels.shape, 4)
 
     def _lay_floor(self, view: View, outlines: Lines) -> None:
@@ -137,7 +137,7 @@ class Raster(Shown):
         if shapes:
             points = (np.concatenate(shapes) - (view.left, view.top)) * (view.scale, -view.scale)
             first = np.concatenate(([0], np.cumsum([len(shape) for shape in shapes])))
-            unit("tools").draw_convex(self._ground, points, first, np.uint32(swapped(self.theme.obstacle)))
+            unit("tools").draw_convex(self._background, points, first, np.uint32(swapped(self.theme.obstacle)))
 
 
 def draw_marks(
@@ -188,7 +188,7 @@ def check_size(size: tuple[int, int]) -> tuple[int, int]:
         width, height = size
     except (TypeError, ValueError):
         raise InputError(f"size is {size!r}; allowed are two whole numbers (width, height)") from None
-    result = (checks.whole("width", width), checks.whole("height", height))
+    result = (checks.integer("width", width), checks.integer("height", height))
     if result[0] * result[1] > MOST_PIXELS:
         raise InputError(f"size is {width} x {height}; allowed are at most {MOST_PIXELS:,} pixels")
     return result

@@ -6,8 +6,8 @@ from typing import Any, Self
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from pyverlet.ground import checks
-from pyverlet.ground.errors import InputError
+from pyverlet.common import checks
+from pyverlet.common.errors import InputError
 from pyverlet.world.world import World
 
 Rect = tuple[float, float, float, float]  # x0, y0, x1, y1 in metres
@@ -37,7 +37,7 @@ class View:
         x0, y0, x1, y1 = (checks.number("rect", value) for value in rect)
         if not (x0 < x1 and y0 < y1):
             raise InputError(f"rect is {rect}; allowed is (x0, y0, x1, y1) with x0 < x1 and y0 < y1")
-        width, height = (checks.whole("size", value) for value in size)
+        width, height = (checks.integer("size", value) for value in size)
         scale = min(width / (x1 - x0), height / (y1 - y0))
         left = 0.5 * (x0 + x1) - 0.5 * width / scale
         return cls(left, 0.5 * (y0 + y1) + 0.5 * height / scale, scale, width, height, y_up)
@@ -75,7 +75,7 @@ def nearest(world: World, point: NDArray[Any], reach: float) -> int | None:
     """The particle whose rim is nearest to `point` (2,), if within `reach`; metres. Inside a circle the distance is negative."""
     if not len(world):
         return None
-    x, y = world.boundary.seam.nearest(world.position - np.asarray(point, dtype=world.position.dtype)).T
+    x, y = world.boundary.periodic.nearest(world.position - np.asarray(point, dtype=world.position.dtype)).T
     gap = np.hypot(x, y) - world.radius
     found = int(np.argmin(gap))
     return found if gap[found] <= reach else None

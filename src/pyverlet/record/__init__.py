@@ -11,12 +11,12 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from pyverlet.ground import checks
-from pyverlet.ground.errors import InputError, Interrupted, PyverletError
-from pyverlet.ground.interrupts import first_signal
-from pyverlet.ground.outside import file_errors
-from pyverlet.ground.progress import OnProgress
-from pyverlet.ground.submodules import lazily
+from pyverlet.common import checks
+from pyverlet.common.errors import InputError, Interrupted, PyverletError
+from pyverlet.common.interrupts import first_signal
+from pyverlet.common.outside import file_errors
+from pyverlet.common.progress import OnProgress
+from pyverlet.common.submodules import lazily
 from pyverlet.picture import DARK, Colouring, Theme
 from pyverlet.picture.pen import Draw
 from pyverlet.picture.view import Rect
@@ -64,7 +64,7 @@ def plan(path: str | Path, *, seconds: float = 10.0, fps: int | None = None, siz
     """Check everything about a recording. Parameters as for `to_video`; a plain .png shows the end."""
     path = checks.path("path", path)
     film = _films.film_for(path)
-    fps = checks.whole("fps", film.default_fps if fps is None else fps, most=MOST_FPS)
+    fps = checks.integer("fps", film.default_fps if fps is None else fps, most=MOST_FPS)
     size = film.sized(size, fps)
     pictures = frame_count(seconds=seconds, dt=1.0 / fps)
     # The least number of frames of physics between pictures so that none is longer than a sixtieth of a second.

@@ -15,8 +15,8 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from pyverlet.ground.errors import InputError
-from pyverlet.ground.outside import file_errors, require
+from pyverlet.common.errors import InputError
+from pyverlet.common.outside import file_errors, require
 from pyverlet.picture import Colouring
 from pyverlet.picture.raster import check_size
 from pyverlet.record import _reel

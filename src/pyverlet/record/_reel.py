@@ -15,7 +15,7 @@ from dataclasses import asdict, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from pyverlet.ground.errors import InputError
+from pyverlet.common.errors import InputError
 from pyverlet.picture import Colouring, Groups
 from pyverlet.picture.colour import COLOURINGS
 from pyverlet.viewers import protocol

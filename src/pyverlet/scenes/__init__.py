@@ -3,9 +3,9 @@
 from importlib import import_module
 from pathlib import Path
 
-from pyverlet.ground import checks
-from pyverlet.ground.errors import InputError
-from pyverlet.ground.guess import did_you_mean
+from pyverlet.common import checks
+from pyverlet.common.errors import InputError
+from pyverlet.common.guess import did_you_mean
 from pyverlet.scenes import sketch
 from pyverlet.scenes._scene import Scene, Settings, Variant
 

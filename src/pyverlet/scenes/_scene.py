@@ -12,12 +12,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from pyverlet.ground import checks
-from pyverlet.ground.arrays import Floats
-from pyverlet.ground.errors import InputError
-from pyverlet.ground.guess import did_you_mean
-from pyverlet.ground.progress import OnProgress
-from pyverlet.ground.shown import Shown, line
+from pyverlet.common import checks
+from pyverlet.common.arrays import Floats
+from pyverlet.common.errors import InputError
+from pyverlet.common.guess import did_you_mean
+from pyverlet.common.progress import OnProgress
+from pyverlet.common.shown import Shown, line
 from pyverlet.laws.collisions import BruteForce, Collisions, Fast
 from pyverlet.laws.integrators import Integrator, TimeCorrectedVerlet
 from pyverlet.scenes import _start
@@ -82,9 +82,9 @@ class Settings:
 
     def __post_init__(self) -> None:
         """Check values that the engine does not check, or that are unused without bounds and collisions."""
-        checks.whole("particles", self.particles, most=MOST_PARTICLES)
+        checks.integer("particles", self.particles, most=MOST_PARTICLES)
         checks.number("radius_spread", self.radius_spread, least=1.0)
-        checks.whole("seed", self.seed, least=0)
+        checks.integer("seed", self.seed, least=0)
         checks.fraction("restitution", self.restitution)
         checks.number("friction", self.friction, least=0.0)
 

@@ -6,7 +6,7 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
-from pyverlet.ground.arrays import Floats
+from pyverlet.common.arrays import Floats
 
 Row = tuple[float, float, list[NDArray[np.intp]]]
 """Height of the centres, available width between the first and the last, and indices of the members per size class."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from pyverlet.laws.rooms import Periodic
+from pyverlet.laws.boundaries import Periodic
 from pyverlet.scenes import _start
 from pyverlet.scenes._scene import Scene, Settings
 from pyverlet.world.actors import Actor

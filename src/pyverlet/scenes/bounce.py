@@ -7,9 +7,9 @@ from typing import Any
 
 import numpy as np
 
+from pyverlet.laws.boundaries import Boundary, Box
 from pyverlet.laws.integrators import ExplicitEuler, Integrator, PositionVerlet, SemiImplicitEuler
-from pyverlet.laws.naive import ClampAndFlip, ProjectOnly
-from pyverlet.laws.rooms import Boundary, Box
+from pyverlet.laws.textbook import ClampAndFlip, ProjectOnly
 from pyverlet.scenes._scene import Scene, Settings, Variant
 from pyverlet.world.clock import Clock
 from pyverlet.world.world import World

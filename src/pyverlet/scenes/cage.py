@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from pyverlet.laws.rooms import Circle
+from pyverlet.laws.boundaries import Circle
 from pyverlet.scenes import _start
 from pyverlet.scenes._scene import Scene, Settings
 from pyverlet.world.world import World

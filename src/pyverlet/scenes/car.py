@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
+from pyverlet.laws.boundaries import Periodic
 from pyverlet.laws.links import Motor, Spring
 from pyverlet.laws.obstacles import Chain
-from pyverlet.laws.rooms import Periodic
 from pyverlet.scenes._scene import Scene, Settings, Show
 from pyverlet.world.world import World
 

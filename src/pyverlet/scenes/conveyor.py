@@ -2,8 +2,8 @@
 
 import numpy as np
 
+from pyverlet.laws.boundaries import Box
 from pyverlet.laws.obstacles import Capsule, Segment
-from pyverlet.laws.rooms import Box
 from pyverlet.scenes import _start
 from pyverlet.scenes._scene import Scene, Settings
 from pyverlet.world.world import World

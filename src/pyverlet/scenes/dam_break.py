@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
+from pyverlet.laws.boundaries import Box
 from pyverlet.laws.forces import Fluid
-from pyverlet.laws.rooms import Box
 from pyverlet.scenes._scene import Scene, Settings, Show
 from pyverlet.world.world import World
 

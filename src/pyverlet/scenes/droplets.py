@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
+from pyverlet.laws.boundaries import Periodic
 from pyverlet.laws.forces import Langevin, LennardJones
-from pyverlet.laws.rooms import Periodic
 from pyverlet.scenes import _start
 from pyverlet.scenes._scene import Scene, Settings, Show
 from pyverlet.world.world import World

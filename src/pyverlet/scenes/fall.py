@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from pyverlet.ground.arrays import Floats
-from pyverlet.laws.rooms import Open
+from pyverlet.common.arrays import Floats
+from pyverlet.laws.boundaries import Open
 from pyverlet.scenes._scene import Scene, Settings
 from pyverlet.world.world import World
 

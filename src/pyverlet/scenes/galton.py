@@ -2,9 +2,9 @@
 
 import numpy as np
 
-from pyverlet.ground.arrays import Floats
+from pyverlet.common.arrays import Floats
+from pyverlet.laws.boundaries import Box
 from pyverlet.laws.obstacles import Capsule, Disc, Segment
-from pyverlet.laws.rooms import Box
 from pyverlet.scenes import _start
 from pyverlet.scenes._scene import Scene, Settings, Show
 from pyverlet.world.world import World

@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from pyverlet.ground.arrays import Floats
-from pyverlet.laws.rooms import Periodic
+from pyverlet.common.arrays import Floats
+from pyverlet.laws.boundaries import Periodic
 from pyverlet.scenes import _start
 from pyverlet.scenes._scene import Graph, Scene, Settings, Show
 from pyverlet.world.world import World
@@ -64,7 +64,7 @@ class Thermometer:
         if world.time > self._time or not self._weight:
             self._look(world)
         radii = world.radius.astype(np.float64)
-        fraction = float(np.pi * (radii @ radii) / np.prod(world.boundary.seam.period))
+        fraction = float(np.pi * (radii @ radii) / np.prod(world.boundary.periodic.period))
         measured, theory = self._z / max(self._weight, 1e-300), state(fraction, radii)
         note = f"pressure P A / N k T = {measured:.2f}; equation of state {theory:.2f}"
         bars = tuple((self._bars / max(self._weight, 1e-300)).tolist())
@@ -78,7 +78,7 @@ class Thermometer:
         speed = np.sqrt(mass * square / (2 * max(heat, 1e-300)))
         count, _ = np.histogram(speed, BARS, (0.0, MOST))
         bars = count / (len(world) * MOST / BARS)
-        area = float(np.prod(world.boundary.seam.period))
+        area = float(np.prod(world.boundary.periodic.period))
         z = world.pressure() * area / (len(world) * max(heat, 1e-300)) if world.time else 1.0
         self._bars, self._z = keep * self._bars + share * bars, keep * self._z + share * z
         self._weight = keep * self._weight + share

@@ -2,8 +2,8 @@
 
 import numpy as np
 
+from pyverlet.laws.boundaries import Open
 from pyverlet.laws.obstacles import Chain
-from pyverlet.laws.rooms import Open
 from pyverlet.scenes import _start
 from pyverlet.scenes._scene import Scene, Settings, Show
 from pyverlet.world.world import World

@@ -10,12 +10,12 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from pyverlet.ground.arrays import Floats
-from pyverlet.ground.errors import InputError
-from pyverlet.ground.outside import read_picture
-from pyverlet.ground.progress import OnProgress
+from pyverlet.common.arrays import Floats
+from pyverlet.common.errors import InputError
+from pyverlet.common.outside import read_picture
+from pyverlet.common.progress import OnProgress
+from pyverlet.laws.boundaries import Box
 from pyverlet.laws.forces import Drag
-from pyverlet.laws.rooms import Box
 from pyverlet.scenes._scene import Scene, Settings, Show
 from pyverlet.world.world import World
 

@@ -2,9 +2,9 @@
 
 import numpy as np
 
-from pyverlet.ground.errors import InputError
+from pyverlet.common.errors import InputError
+from pyverlet.laws.boundaries import Open
 from pyverlet.laws.links import Stick
-from pyverlet.laws.rooms import Open
 from pyverlet.scenes._scene import Scene, Settings
 from pyverlet.world.world import World
 

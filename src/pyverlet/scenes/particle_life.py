@@ -7,8 +7,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from pyverlet.laws.boundaries import Periodic
 from pyverlet.laws.forces import Drag, PairForce
-from pyverlet.laws.rooms import Periodic
 from pyverlet.scenes import _start
 from pyverlet.scenes._scene import Scene, Settings
 from pyverlet.world.world import World

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
+from pyverlet.laws.boundaries import Box
 from pyverlet.laws.forces import Drag
 from pyverlet.laws.links import AngleLimit, Stick
 from pyverlet.laws.obstacles import Capsule
-from pyverlet.laws.rooms import Box
 from pyverlet.scenes._scene import Scene, Settings
 from pyverlet.world.world import World
 

@@ -7,10 +7,10 @@ from typing import Any
 
 import numpy as np
 
-from pyverlet.ground import checks
-from pyverlet.ground.constants import FRAME_BUDGET_MS
-from pyverlet.ground.errors import InputError
-from pyverlet.ground.progress import OnProgress
+from pyverlet.common import checks
+from pyverlet.common.constants import FRAME_BUDGET_MS
+from pyverlet.common.errors import InputError
+from pyverlet.common.progress import OnProgress
 from pyverlet.world.world import World
 
 MAX_FRAMES = 10_000_000  # longest run: more is almost surely a mistyped duration (46 hours of simulated time at 60 Hz)
@@ -30,7 +30,7 @@ def frame_count(*, seconds: float | None, dt: float, frames: int | None = None) 
     if frames is not None:
         if seconds is not None:
             raise InputError(f"frames is {frames} and seconds is {seconds:g}; allowed is one of them, not both")
-        return checks.whole("frames", frames, most=MAX_FRAMES)
+        return checks.integer("frames", frames, most=MAX_FRAMES)
     wanted = checks.number("seconds", DEFAULT_SECONDS if seconds is None else seconds, above=0.0) / dt
     if wanted > MAX_FRAMES:
         raise InputError(f"seconds / dt is {wanted:.4g} frames; allowed are at most {MAX_FRAMES:,}")

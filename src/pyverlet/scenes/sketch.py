@@ -21,11 +21,11 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any
 
-from pyverlet.ground.errors import InputError, Interrupted
-from pyverlet.ground.guess import did_you_mean
-from pyverlet.ground.outside import file_errors
-from pyverlet.ground.shown import Shown
-from pyverlet.ground.time_limit import TimeLimit, TooLong
+from pyverlet.common.errors import InputError, Interrupted
+from pyverlet.common.guess import did_you_mean
+from pyverlet.common.outside import file_errors
+from pyverlet.common.shown import Shown
+from pyverlet.common.time_limit import TimeLimit, TooLong
 from pyverlet.scenes._scene import Scene, Settings, set_on_world
 from pyverlet.scenes.sliders import Board, board
 from pyverlet.world.actors import Actor

@@ -4,8 +4,8 @@ import contextlib
 from collections.abc import Iterator
 from contextvars import ContextVar
 
-from pyverlet.ground import checks
-from pyverlet.ground.errors import InputError
+from pyverlet.common import checks
+from pyverlet.common.errors import InputError
 
 Board = dict[str, "Slider"]  # sliders by name, in order of creation
 

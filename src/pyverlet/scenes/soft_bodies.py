@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from pyverlet.laws.rooms import Box
+from pyverlet.laws.boundaries import Box
 from pyverlet.scenes import _start
 from pyverlet.scenes._scene import Scene, Settings
 from pyverlet.world import builders

@@ -2,8 +2,8 @@
 
 import numpy as np
 
+from pyverlet.laws.boundaries import Box
 from pyverlet.laws.links import Stick
-from pyverlet.laws.rooms import Box
 from pyverlet.scenes._scene import Scene, Settings
 from pyverlet.world import builders
 from pyverlet.world.world import World

@@ -8,10 +8,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from pyverlet.ground.arrays import Array
-from pyverlet.ground.errors import InputError, KeyInputError
-from pyverlet.ground.guess import did_you_mean
-from pyverlet.ground.shown import count as counted
+from pyverlet.common.arrays import Array
+from pyverlet.common.errors import InputError, KeyInputError
+from pyverlet.common.guess import did_you_mean
+from pyverlet.common.shown import count as counted
 
 Columns = dict[str, Array]  # (n + 1,) or (n + 1, k) by name: the default of new particles, then a value or row for each
 
@@ -38,7 +38,7 @@ class Data(MutableMapping[str, Any]):
         return columns
 
     def __getitem__(self, name: str) -> Array:
-        with self._owner._state.turn:
+        with self._owner._state.lock:
             where = self._owner._where
             found: Array = known(self._columns, name)[1:][where]
             if isinstance(where, np.ndarray):
@@ -48,7 +48,7 @@ class Data(MutableMapping[str, Any]):
     def __setitem__(self, name: Any, value: ArrayLike) -> None:
         if not isinstance(name, str) or not name:
             raise InputError(f"name is {name!r}; allowed is a text")
-        with self._owner._state.turn.held():
+        with self._owner._state.lock.held():
             columns = self._columns
             if self._whole and name not in columns:
                 values = rows(name, value, len(self._owner), None)
@@ -64,7 +64,7 @@ class Data(MutableMapping[str, Any]):
     def __delitem__(self, name: str) -> None:
         if not self._whole:
             raise InputError(f"data[{name!r}] is of all particles; allowed is del world.data[{name!r}]")
-        with self._owner._state.turn.held():
+        with self._owner._state.lock.held():
             known(self._columns, name)
             del self._columns[name]
 

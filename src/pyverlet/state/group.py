@@ -8,9 +8,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from pyverlet.ground import checks
-from pyverlet.ground.arrays import Array
-from pyverlet.ground.errors import IndexInputError, InputError
+from pyverlet.common import checks
+from pyverlet.common.arrays import Array
+from pyverlet.common.errors import IndexInputError, InputError
 from pyverlet.state.data import Data
 from pyverlet.state.state import State
 
@@ -31,9 +31,9 @@ class Column:
         state: State = group._state
         version = state.version
         array: Array = getattr(state, self._name)[where := group._where]
-        if state.version == version and not state.turn.taken and not isinstance(where, np.ndarray):
+        if state.version == version and not state.lock.taken and not isinstance(where, np.ndarray):
             return array  # unchanged meanwhile: no lock was needed
-        with state.turn as stepped:
+        with state.lock as stepped:
             array = getattr(state, self._name)[where := group._where]
             if (stepped or isinstance(where, np.ndarray)) and isinstance(array, np.ndarray):
                 array = array.copy()
@@ -41,7 +41,7 @@ class Column:
             return array
 
     def __set__(self, group: Any, value: Any) -> None:
-        with group._state.turn.held():
+        with group._state.lock.held():
             array = getattr(group._state, self._name)
             array[group._where] = checks.values_for(self._name, value, array[group._where])
 
@@ -166,7 +166,7 @@ class Group(Handle):
         return self._count
 
     def __getitem__(self, which: Any) -> Any:
-        with self._state.turn:
+        with self._state.lock:
             numbers = self._state.number[self._where]
             try:
                 picked = np.array(numbers[which])
@@ -198,7 +198,7 @@ class Group(Handle):
     def _left(self) -> Any:
         """Indices of the remaining particles in the world."""
         if self._version != self._state.version:
-            with self._state.turn:
+            with self._state.lock:
                 self._found, self._version = self._find(), self._state.version
                 self._count = len(self._state.number[self._found])
         return self._found
@@ -243,7 +243,7 @@ class Group(Handle):
             InputError: there is no such particle.
         """
         state = self._state
-        with state.turn.held():
+        with state.lock.held():
             try:
                 pinned = self.index[index]
             except IndexError:
@@ -296,13 +296,13 @@ class Particle(Handle):
     @property
     def is_there(self) -> bool:
         """Whether it has not been removed."""
-        with self._state.turn:
+        with self._state.lock:
             return bool(self._state.index_of(np.array(self.number)) >= 0)
 
     @property
     def index(self) -> int:
         """Its current index among all of the world's particles; InputError if it was removed."""
-        with self._state.turn:
+        with self._state.lock:
             where = int(self._state.index_of(np.array(self.number)))
         if where < 0:
             raise InputError(f"particle {self.number} was removed; allowed is one that is there")

@@ -1,6 +1,6 @@
 """`State`, the arrays of all particles in the order they were added.
 
-They are valid between frames. A frame begins by gathering them into `Slots`, and ends by scattering the result back.
+They are valid between frames. A frame begins by gathering them into `SortedState`, and ends by scattering the result back.
 """
 
 from __future__ import annotations
@@ -14,11 +14,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from pyverlet.ground import checks, memory
-from pyverlet.ground.arrays import Array
-from pyverlet.ground.step_lock import StepLock
-from pyverlet.state import seam
+from pyverlet.common import checks, memory
+from pyverlet.common.arrays import Array
+from pyverlet.common.renamed import Renamed
+from pyverlet.common.step_lock import StepLock
 from pyverlet.state.data import Columns
+from pyverlet.state.periodicity import NONE, Periodicity
 
 ROWS = ("position", "velocity", "acceleration")
 SET = ("radius", "mass", "restitution", "friction", "rolling_resistance", "inertia")
@@ -29,7 +30,7 @@ MARKS = ("category", "mask", "material", "fixed_rotation")
 EVERYONE = 0xFFFFFFFF  # a mask that accepts every category
 
 
-def meet(category: ArrayLike, mask: ArrayLike, other_category: ArrayLike, other_mask: ArrayLike) -> NDArray[np.bool_]:
+def may_collide(category: ArrayLike, mask: ArrayLike, other_category: ArrayLike, other_mask: ArrayLike) -> NDArray[np.bool_]:
     """Whether each of two has a bit of its category in the other's mask."""
     bits = (np.asarray(each, np.int64) for each in (category, other_mask, other_category, mask))
     return np.asarray((next(bits) & next(bits) != 0) & (next(bits) & next(bits) != 0))
@@ -63,7 +64,7 @@ def spin_radius(inertia: Array, radius: Array, mass: Array) -> Array:
 
 
 class Arrays:
-    """The columns that `State` and `Slots` have in common; see `State`."""
+    """The columns that `State` and `SortedState` have in common; see `State`."""
 
     position: Array
     velocity: Array
@@ -79,6 +80,8 @@ class Arrays:
     mask: Array
     material: Array
     fixed_rotation: Array
+
+    seam: Any = Renamed("periodic")
 
 
 class State(Arrays):
@@ -108,8 +111,8 @@ class State(Arrays):
         let_go: whether supports of particles may have been removed since the last frame.
     """
 
-    seam = seam.NONE
-    room: Any = None  # of its world
+    periodic: Periodicity = NONE
+    boundary: Any = None  # of its world
     shared = let_go = False
     shown: dict[str, Array]
     _handed: dict[str, weakref.ref[Array]]  # the arrays that may be written to, see `touched`
@@ -119,7 +122,7 @@ class State(Arrays):
     crossed: NDArray[np.float64]
 
     def __init__(self, dtype: np.dtype[Any]) -> None:
-        self.dtype, self.turn = dtype, StepLock()
+        self.dtype, self.lock = dtype, StepLock()
         store: dict[str, Array] = {name: np.empty((0, 2), dtype) for name in ROWS}
         store |= {name: np.empty(0, dtype) for name in COLUMNS}
         for names, kind in ((MARKS, np.uint32), (("number",), np.int64), (("angle",), np.float64)):
@@ -169,15 +172,15 @@ class State(Arrays):
         return self.position.astype(np.float64) + self.crossed
 
     def __getstate__(self) -> dict[str, Any]:
-        kept = {name: getattr(self, name) for name in ("dtype", "seam", "room", "begun", "version", "materials")}
+        kept = {name: getattr(self, name) for name in ("dtype", "periodic", "boundary", "begun", "version", "materials")}
         kept["_key"] = self.key
-        with self.turn:
+        with self.lock:
             kept |= {"numbers": self.numbers, "data": {name: column.copy() for name, column in self.data.items()}}
             return kept | {"_store": {name: array.copy() for name, array in self.arrays()}}
 
     def __setstate__(self, state: dict[str, Any]) -> None:
         vars(self).update(state)
-        self.turn = StepLock()
+        self.lock = StepLock()
         self.live_in(self._store, len(self._store["number"]))
 
     def arrays(self) -> Iterator[tuple[str, Array]]:

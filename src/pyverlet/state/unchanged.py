@@ -7,9 +7,9 @@ from typing import Final
 
 import numpy as np
 
+from pyverlet.common.arrays import Array
+from pyverlet.common.constants import KNOWN_FROM
 from pyverlet.core import unit
-from pyverlet.ground.arrays import Array
-from pyverlet.ground.constants import KNOWN_FROM
 
 ROWS: Final = 4096
 """Rows per checksum, and per flag of written blocks: `WRITTEN` of `core.rows`."""

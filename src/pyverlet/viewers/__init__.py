@@ -6,7 +6,7 @@ from collections.abc import Callable
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any, Literal, TypedDict, Unpack, overload
 
-from pyverlet.ground.submodules import lazily
+from pyverlet.common.submodules import lazily
 
 if TYPE_CHECKING:
     from pyverlet.viewers.handle import Page
@@ -97,7 +97,7 @@ def widget(world: World | Panels, *, title: str = "pyverlet", dt: float = 1 / 60
     Raises:
         InputError: the extra `notebook` is missing, or an argument is outside what is allowed.
     """
-    from pyverlet.ground.outside import require
+    from pyverlet.common.outside import require
 
     require("a widget", "anywidget", "PIL", extra="notebook")
     from pyverlet.viewers.notebook import Widget

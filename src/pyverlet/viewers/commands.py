@@ -11,9 +11,9 @@ from types import UnionType
 from typing import Annotated, Any, Self, cast, dataclass_transform, get_args, get_origin
 
 from pyverlet import scenes
-from pyverlet.ground import checks
-from pyverlet.ground.errors import InputError
-from pyverlet.ground.shown import brief
+from pyverlet.common import checks
+from pyverlet.common.errors import InputError
+from pyverlet.common.shown import brief
 from pyverlet.laws import integrators
 from pyverlet.picture import colour
 from pyverlet.picture.view import Rect
@@ -97,7 +97,7 @@ class Pause(Message):
 class Step(Message):
     """Pause, then advance by this many frames."""
 
-    frames: Annotated[int, partial(checks.whole, "frames", most=MAX_STEPS)] = 1
+    frames: Annotated[int, partial(checks.integer, "frames", most=MAX_STEPS)] = 1
 
 
 class Reset(Message):
@@ -114,7 +114,7 @@ class Build(Message):
     """Replace the worlds by a scene's (None: the same scene) with this many particles (None: the scene's default)."""
 
     scene: Annotated[str | None, partial(one_of, "scene", scenes.SCENES)]
-    particles: Annotated[int | None, partial(checks.whole, "particles", most=MAX_PARTICLES)]
+    particles: Annotated[int | None, partial(checks.integer, "particles", most=MAX_PARTICLES)]
 
 
 class Setting(Message):
@@ -131,7 +131,7 @@ class SetGravity(Setting):
 class SetSubsteps(Setting):
     """Set the number of substeps per frame."""
 
-    value: Annotated[int, partial(checks.whole, "substeps", most=MAX_SUBSTEPS)]
+    value: Annotated[int, partial(checks.integer, "substeps", most=MAX_SUBSTEPS)]
 
 
 class SetRestitution(Setting):
@@ -253,8 +253,8 @@ class ViewOptions(Message):
     """View options of one tab."""
 
     part: Rect | None = None  # of the plane, (x0, y0, x1, y1) in metres; None leaves it to the camera
-    width: Annotated[int, partial(checks.whole, "width", most=LARGEST_SIDE)] = 960  # of the picture on the screen, pixels
-    height: Annotated[int, partial(checks.whole, "height", most=LARGEST_SIDE)] = 720
+    width: Annotated[int, partial(checks.integer, "width", most=LARGEST_SIDE)] = 960  # of the picture on the screen, pixels
+    height: Annotated[int, partial(checks.integer, "height", most=LARGEST_SIDE)] = 720
     colour: Annotated[str, partial(one_of, "colour", COLOURINGS)] = "order"
     dark: bool = True  # dark theme
     velocity: bool = False  # whether the tab needs velocities

@@ -4,7 +4,7 @@ import contextlib
 from collections.abc import Sequence
 from typing import Any, get_args
 
-from pyverlet.ground.errors import InputError
+from pyverlet.common.errors import InputError
 from pyverlet.laws import integrators
 from pyverlet.scenes._scene import set_on_world
 from pyverlet.viewers import commands

@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from pyverlet.laws.touches import Pushes
+from pyverlet.laws.contact_records import Pushes
 from pyverlet.world.world import World
 
 AGAIN_S = 0.1  # least time between recorded frames
@@ -44,11 +44,11 @@ class Forces:
             return
         began = time.monotonic()
         with ExitStack() as stack:
-            noting = [stack.enter_context(world.noting_contacts()) for world in self._worlds]
+            recording = [stack.enter_context(world.recording_contacts()) for world in self._worlds]
             yield
         now = time.monotonic()
         self._due = now + max(AGAIN_S, SHARE * (now - began))
-        self._found = [each.pushes() for each in noting]
+        self._found = [each.pushes() for each in recording]
 
     def now(self) -> Contacts:
         """The contacts recorded last, between circles that still exist."""

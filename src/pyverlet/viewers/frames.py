@@ -10,18 +10,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pyverlet.core import unit
+from pyverlet.laws.boundaries import Boundary, Circle
 from pyverlet.laws.obstacles import Outline
-from pyverlet.laws.rooms import Boundary, Circle
 from pyverlet.picture import periodic_images
 from pyverlet.picture.colour import USUAL_MULTIPLE
 from pyverlet.picture.pen import Drawing
 from pyverlet.picture.view import Rect
 from pyverlet.scenes._scene import Graph
-from pyverlet.state.seam import Seam
+from pyverlet.state.periodicity import Periodicity
 from pyverlet.viewers.forces import NONE as NO_CONTACTS
 from pyverlet.viewers.forces import Contacts
 from pyverlet.viewers.layout import Layout
-from pyverlet.world.moments import Moment
+from pyverlet.world.substep_snapshot import SubstepSnapshot
 from pyverlet.world.world import World
 
 
@@ -39,7 +39,7 @@ class OutlineCache:
     def draw(self, layout: Layout) -> tuple[Outline, ...]:
         """The current outlines, in the picture's coordinates."""
         found = [
-            (layout.offset(k), obstacle.drawn(), world.boundary.seam)
+            (layout.offset(k), obstacle.drawn(), world.boundary.periodic)
             for k, world in enumerate(self._worlds)
             for obstacle in world.obstacles
             if obstacle.moves == self._moving
@@ -47,7 +47,7 @@ class OutlineCache:
         drawn = [outlines for _, outlines, _ in found]
         if len(drawn) != len(self._drawn) or any(a is not b for a, b in zip(drawn, self._drawn, strict=True)):
             self._drawn = drawn
-            images = [(offset, periodic_images.outlines(outlines, seam)) for offset, outlines, seam in found]
+            images = [(offset, periodic_images.outlines(outlines, periodic)) for offset, outlines, periodic in found]
             self._outlines = tuple(Outline(points + offset, filled) for offset, outlines in images for points, filled in outlines)
         return self._outlines
 
@@ -97,7 +97,9 @@ class Shape:
     kinds: NDArray[np.uint32] | None  # (n, 2) category and mask, (0, 0) without collisions; None if all collide with all
     apart: NDArray[np.uint32]  # (k, 2) circles that do not collide because of a link
     colours: NDArray[np.uint8] | None  # (n, 3) bytes R, G, B, the circles' own colours, if any; read-only
-    seams: tuple[tuple[int, int, Seam], ...] = ()  # periodic worlds: first circle, number of circles, periodicity in the picture
+    periodicities: tuple[
+        tuple[int, int, Periodicity], ...
+    ] = ()  # periodic worlds: first circle, number of circles, periodicity in the picture
 
 
 @dataclass(frozen=True)
@@ -154,14 +156,14 @@ class Frame:
     drawing: Drawing = ()  # the user's drawing; between substeps that of the previous frame
     contacts: Contacts = NO_CONTACTS  # contact forces, if shown; slightly older
 
-    def moved(self, moment: Moment, seq: int, status: Status, *, velocity: bool) -> Frame:
+    def moved(self, snapshot: SubstepSnapshot, seq: int, status: Status, *, velocity: bool) -> Frame:
         """The same frame a little later, between two substeps; velocities are not updated unless requested."""
         moving, moving_order = self.moving, self.moving_order
         if velocity:
-            rows, moving, order = moment.look()
+            rows, moving, order = snapshot.look()
             moving.flags.writeable, moving_order = False, order
         else:
-            rows, order = moment.positions()
+            rows, order = snapshot.positions()
         rows.flags.writeable = False
         return replace(self, seq=seq, status=status, rows=rows, moving=moving, order=order, moving_order=moving_order)
 
@@ -207,9 +209,9 @@ class Frame:
     def copies(self) -> tuple[NDArray[np.uint32], NDArray[np.float32]]:
         """Copies of circles that reach across a periodic boundary: (k,) which, and (k, 2) positions, m."""
         found = [(np.empty(0, np.uint32), np.empty((0, 2), np.float32))]
-        for first, count, seam in self.shape.seams:
+        for first, count, periodic in self.shape.periodicities:
             mine = slice(first, first + count)
-            owner, place = periodic_images.copies(self.position[mine], self.shape.radius[mine], seam)
+            owner, place = periodic_images.copies(self.position[mine], self.shape.radius[mine], periodic)
             found.append((owner + np.uint32(first), place))
         owners, places = zip(*found, strict=True)
         return np.concatenate(owners), np.concatenate(places)
@@ -218,9 +220,9 @@ class Frame:
     def segments(self) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
         """Links as lines, (m, 2, 2) in m, and (m,) tensions, N; those across a periodic boundary from both ends."""
         ends, force, found = self.position[self.joined], self.force, []
-        for first, count, seam in self.shape.seams:
+        for first, count, periodic in self.shape.periodicities:
             mine = (self.joined[:, 0] >= first) & (self.joined[:, 0] < first + count)
-            found.append(periodic_images.lines(ends[mine], force[mine], seam))
+            found.append(periodic_images.lines(ends[mine], force[mine], periodic))
             ends, force = ends[~mine], force[~mine]
         return np.concatenate([ends, *(lines for lines, _ in found)]), np.concatenate([force, *(pulls for _, pulls in found)])
 
@@ -286,7 +288,7 @@ class Camera:
             lowest, highest = np.min(extents, axis=0), np.max(extents, axis=0)
             x0, y0, x1, y1 = (float(value) for value in (*lowest[:2], *highest[2:]))
             # Circles stick out across a periodic boundary.
-            out = max((1.1 * float(world.radius.max(initial=0.0)) for world in worlds if world.boundary.seam), default=0.0)
+            out = max((1.1 * float(world.radius.max(initial=0.0)) for world in worlds if world.boundary.periodic), default=0.0)
             margin = max(VIEW_MARGIN * max(x1 - x0, y1 - y0), out)
             self._fixed = (x0 - margin, y0 - margin, x1 + margin, y1 + margin)
             return

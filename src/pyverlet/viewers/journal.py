@@ -12,17 +12,17 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+from pyverlet.common.errors import InputError
+from pyverlet.common.outside import file_errors
 from pyverlet.data import settings_json
 from pyverlet.data.atomic_file import Closing
 from pyverlet.data.snapshot import to_bytes
-from pyverlet.ground.errors import InputError
-from pyverlet.ground.outside import file_errors
 from pyverlet.scenes.sketch import Sketch
 from pyverlet.viewers.commands import Command
 from pyverlet.viewers.presentation import Presentation
 from pyverlet.viewers.view_state import ViewState
-from pyverlet.world.moments import Moment
 from pyverlet.world.panels import every_frame
+from pyverlet.world.substep_snapshot import SubstepSnapshot
 from pyverlet.world.world import World
 
 _log = logging.getLogger(__name__)
@@ -95,7 +95,7 @@ class _RecordedState(ViewState):
         super().__init__(presentation)
         self._journal, self._substep = journal, 0
         journal.note(
-            worlds=[{"name": panel.name, **_told(presentation, panel.world)} for panel in presentation.panels],
+            worlds=[{"name": panel.name, **_described(presentation, panel.world)} for panel in presentation.panels],
             title=presentation.title,
             part=presentation.part,
             line=presentation.panels.line,
@@ -107,15 +107,15 @@ class _RecordedState(ViewState):
         self._journal.note(**line, **({"substep": self._substep} if self._substep else {}))
         super().do(command)
 
-    def step(self, dt: float, observer: Callable[[Moment], None] | None = None) -> None:
+    def step(self, dt: float, observer: Callable[[SubstepSnapshot], None] | None = None) -> None:
         self._journal.note_news(looked_on=observer is not None)  # then pointers also follow the mouse between substeps
         if self.pointers.busy:
             self._journal.note_news(room=self.layout.room)
 
-        def counted(moment: Moment) -> None:
+        def counted(snapshot: SubstepSnapshot) -> None:
             self._substep += 1
             assert observer
-            observer(moment)
+            observer(snapshot)
 
         try:
             super().step(dt, observer and counted)
@@ -127,7 +127,7 @@ class _RecordedState(ViewState):
         self._journal.passed(self.panels.state_hash)
 
 
-def _told(presentation: Presentation, world: World) -> dict[str, Any]:
+def _described(presentation: Presentation, world: World) -> dict[str, Any]:
     """How to get this world again."""
     sketch = presentation.callbacks
     if not isinstance(sketch, Sketch) or (len(presentation.panels) > 1 and not sketch.has_callbacks):

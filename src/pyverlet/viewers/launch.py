@@ -14,9 +14,9 @@ from collections.abc import Callable, Iterator
 
 import uvicorn
 
-from pyverlet.ground import checks
-from pyverlet.ground.errors import InputError
-from pyverlet.ground.interrupts import first_signal
+from pyverlet.common import checks
+from pyverlet.common.errors import InputError
+from pyverlet.common.interrupts import first_signal
 from pyverlet.viewers import DEFAULT_PORT
 from pyverlet.viewers.commands import ViewOptions
 from pyverlet.viewers.presentation import Presentation
@@ -135,7 +135,7 @@ def has_screen() -> bool:
 
 def take_port(port: int) -> socket.socket:
     """A socket that listens on the port; early requests wait until the server is up. InputError if that fails."""
-    checks.whole("port", port, least=0, most=65535)
+    checks.integer("port", port, least=0, most=65535)
     try:
         return socket.create_server((HERE, port))
     except OSError as error:

@@ -13,7 +13,7 @@ import anywidget
 import traitlets
 from PIL import Image
 
-from pyverlet.ground import checks
+from pyverlet.common import checks
 from pyverlet.viewers import bundle
 from pyverlet.viewers.commands import Release
 from pyverlet.viewers.presentation import Presentation
@@ -41,7 +41,7 @@ class Widget(anywidget.AnyWidget):
         self._encoder = Encoder()
         self._displays: dict[str, Display] = {}
         self._pointers = 0
-        super().__init__(height=checks.whole("height", height, least=100, most=4096))
+        super().__init__(height=checks.integer("height", height, least=100, most=4096))
         self.on_msg(self._on_message)
 
     def _on_message(self, widget: Any, content: Any, buffers: Sequence[Any]) -> None:
@@ -54,7 +54,7 @@ class Widget(anywidget.AnyWidget):
         display = self._display_of(content["view"])
         words = content.get("words")
         replies = [reply for text in (words[:MOST_WORDS] if isinstance(words, list) else []) for reply in display.obey(text)]
-        self._session.turn(longest=LONGEST_S)
+        self._session.run_once(longest=LONGEST_S)
         if news := display.news():
             frame, options, shape = news
             replies += [*shape, self._encoder.frame(frame, options)]

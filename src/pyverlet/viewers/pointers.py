@@ -85,7 +85,7 @@ class Pointers:
             elif force is not None and force.particle >= 0:
                 world = self._worlds[self._world_of[pointer]]
                 x, y = (float(value) for value in world.position[force.particle])
-                dx, dy = world.boundary.seam.nearest(np.array(self._aim[pointer]) - (x, y))
+                dx, dy = world.boundary.periodic.nearest(np.array(self._aim[pointer]) - (x, y))
                 shorten = min(1.0, LEASH * view_size / max(float(np.hypot(dx, dy)), 1e-30))
                 force.target = (x + dx * shorten, y + dy * shorten)
 
@@ -149,7 +149,7 @@ def usual_density(world: World) -> float:
 
 
 MOST = 50  # undo steps
-ROOM = 256_000_000  # bytes for all of them, approximately; at least two are kept
+CAPACITY = 256_000_000  # bytes for all of them, approximately; at least two are kept
 EACH = 400  # approximate bytes per particle in a copy of a world
 
 
@@ -181,7 +181,7 @@ class History:
             self._back.append(self._before)
             self._forth.clear()
             self._strokes.add(pointer)
-            most = max(2, min(MOST, ROOM // (EACH * max(1, sum(map(len, self._panels.worlds))))))
+            most = max(2, min(MOST, CAPACITY // (EACH * max(1, sum(map(len, self._panels.worlds))))))
             del self._back[:-most]
         self._before = None
 

@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pyverlet import scenes
-from pyverlet.ground.errors import InputError
-from pyverlet.ground.progress import OnProgress
+from pyverlet.common.errors import InputError
+from pyverlet.common.progress import OnProgress
 from pyverlet.laws.integrators import Integrator
 from pyverlet.picture.view import Rect
 from pyverlet.scenes import Scene

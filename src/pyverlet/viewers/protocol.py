@@ -20,8 +20,8 @@ from typing import Any
 
 import numpy as np
 
-from pyverlet.ground.errors import InputError
-from pyverlet.ground.shown import brief
+from pyverlet.common.errors import InputError
+from pyverlet.common.shown import brief
 from pyverlet.laws import integrators
 from pyverlet.laws.obstacles import Outline
 from pyverlet.picture.pen import Drawing, Stroke

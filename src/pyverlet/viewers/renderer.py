@@ -12,7 +12,7 @@ from typing import Any, cast
 import numpy as np
 from numpy.typing import NDArray
 
-from pyverlet.ground.errors import InputError
+from pyverlet.common.errors import InputError
 from pyverlet.laws.obstacles import Outline
 from pyverlet.picture import DARK, LIGHT, ByOrigin, Colouring, Fixed, Pen, Raster, Theme, View
 from pyverlet.picture.colour import COLOURINGS, Packed

@@ -8,13 +8,13 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+from pyverlet.common import checks
+from pyverlet.common.errors import InputError, PyverletError
+from pyverlet.common.outside import file_errors
+from pyverlet.common.progress import OnProgress
 from pyverlet.data import settings_json
 from pyverlet.data.settings_json import find
 from pyverlet.data.snapshot import from_bytes
-from pyverlet.ground import checks
-from pyverlet.ground.errors import InputError, PyverletError
-from pyverlet.ground.outside import file_errors
-from pyverlet.ground.progress import OnProgress
 from pyverlet.scenes.sketch import Sketch, SketchError
 from pyverlet.viewers import commands
 from pyverlet.viewers.commands import Command, Reset
@@ -22,8 +22,8 @@ from pyverlet.viewers.journal import FIELDS, FORMAT
 from pyverlet.viewers.layout import Layout
 from pyverlet.viewers.presentation import Presentation
 from pyverlet.viewers.view_state import ViewState
-from pyverlet.world.moments import Moment
 from pyverlet.world.panels import Panel, Panels
+from pyverlet.world.substep_snapshot import SubstepSnapshot
 from pyverlet.world.world import World
 
 _COMMANDS: dict[str, Any] = {command.__name__: command for command in commands.COMMANDS.values()}
@@ -65,7 +65,7 @@ class Script:
         for number, line in enumerate(lines[:-1]):  # after the last newline is nothing, or an incomplete line
             try:
                 what = json.loads(line)
-                frame = checks.whole("frame", what.pop("frame"), least=0)
+                frame = checks.integer("frame", what.pop("frame"), least=0)
                 if number == 0:
                     if what["pvlog"] != FORMAT:
                         raise InputError(f"pvlog is {what['pvlog']!r}; allowed is {FORMAT}")
@@ -73,7 +73,7 @@ class Script:
                     continue
                 if self.events and frame < self.events[-1].frame:
                     raise InputError(f"frame is {frame} after {self.events[-1].frame}; allowed are frames in order")
-                substep = checks.whole("substep", what.pop("substep", 0), least=0)
+                substep = checks.integer("substep", what.pop("substep", 0), least=0)
                 command = _command(dict(what)) if "do" in what else None
                 self.events.append(Event(frame, substep, what, command))
             except (ValueError, KeyError, TypeError, AttributeError, RecursionError) as error:  # InputError is a ValueError
@@ -167,7 +167,7 @@ class ReplayState(ViewState):
         self.frame, self.checked = 0, 0
         self._at = 1  # index of the next event; the first are the worlds
         self._substep = 0
-        self._looked_on = False
+        self._observed = False
         self._room: Any = None
 
     def do(self, command: Command) -> None:
@@ -177,7 +177,7 @@ class ReplayState(ViewState):
             super().__init__(self._script.open())
             self._pinned = changes + 1
 
-    def step(self, dt: float, observer: Callable[[Moment], None] | None = None) -> None:
+    def step(self, dt: float, observer: Callable[[SubstepSnapshot], None] | None = None) -> None:
         self._substep = 0
         self._apply()
         events = self._script.events
@@ -185,17 +185,17 @@ class ReplayState(ViewState):
             raise EndError(f"the journal ends here, after {self.frame:,} frames; {self.checked} hashes are as they were")
         self._set_room()
 
-        def between(moment: Moment) -> None:
+        def between(snapshot: SubstepSnapshot) -> None:
             self._substep += 1
             self._apply()
             self._set_room()
             if observer:
-                observer(moment)
+                observer(snapshot)
 
         stop = next((k for k in range(self._at, len(events)) if "stopped" in events[k].what), None)
         stops = stop is not None and events[stop].frame == self.frame
         try:
-            super().step(self._script.dt, between if self._looked_on else None)
+            super().step(self._script.dt, between if self._observed else None)
         except Exception as error:
             if stop is None or not stops:
                 raise
@@ -230,7 +230,7 @@ class ReplayState(ViewState):
                 self._pinned = changes + 1
             elif "hash" in what:
                 self._check(what["hash"])
-            self._looked_on = what.get("looked_on", self._looked_on)
+            self._observed = what.get("looked_on", self._observed)
             self._room = what.get("room", self._room)
 
     def _set_room(self) -> None:

@@ -16,8 +16,8 @@ from typing import Self
 import numpy as np
 from numpy.typing import NDArray
 
-from pyverlet.ground import checks
-from pyverlet.ground.errors import PyverletError
+from pyverlet.common import checks
+from pyverlet.common.errors import PyverletError
 from pyverlet.scenes.sketch import SketchError
 from pyverlet.viewers import commands as asked
 from pyverlet.viewers import controls
@@ -28,16 +28,16 @@ from pyverlet.viewers.readouts import Readouts
 from pyverlet.viewers.task_queue import Item, TaskQueue
 from pyverlet.viewers.view_state import ViewState
 from pyverlet.world.clock import Clock
-from pyverlet.world.moments import Moment
 from pyverlet.world.panels import Panels
+from pyverlet.world.substep_snapshot import SubstepSnapshot
 from pyverlet.world.world import World
 
 _log = logging.getLogger(__name__)
 
 MAX_CATCH_UP = 4  # late frames made up for at once; more are dropped and counted, so that slow worlds run slowly but smoothly
 IDLE_S = 0.1  # longest sleep while nothing moves: on some systems Ctrl-C is delayed by it
-KEEN = 10  # pictures with current velocities after a viewer has asked for some
-KEEN_ON_FORCES = 60  # the same for forces, which are computed a few times per second
+VELOCITY_FRAMES = 10  # pictures with current velocities after a viewer has asked for some
+FORCE_FRAMES = 60  # the same for forces, which are computed a few times per second
 STOP_TIMEOUT_S = 10.0  # longest wait for the current frame when a session stops
 
 
@@ -94,11 +94,11 @@ class Session:
         """
         self._taken = max(self._taken, frame.seq)
         if velocity:
-            self._velocity_until = max(self._velocity_until, frame.seq + KEEN)
+            self._velocity_until = max(self._velocity_until, frame.seq + VELOCITY_FRAMES)
 
     def want_forces(self, frame: Frame) -> None:
         """Tell that a viewer with this frame shows forces between circles."""
-        self._force_until = max(self._force_until, frame.seq + KEEN_ON_FORCES)
+        self._force_until = max(self._force_until, frame.seq + FORCE_FRAMES)
 
     def subscribe(self, listener: Callable[[], None]) -> Callable[[], None]:
         """Register `listener()`, called on the physics thread after every new frame; it must return at once and not raise.
@@ -145,7 +145,7 @@ class Session:
         self._last = time.perf_counter()
         with self._tasks.by_this_thread():
             while not self._stopping.is_set():
-                wait = self.turn()
+                wait = self.run_once()
                 if self._held():
                     if self._apply_each(self._tasks.waiting(IDLE_S)):
                         self._publish()
@@ -154,7 +154,7 @@ class Session:
                     time.sleep(wait)
             self._view_state.pointers.release_all()
 
-    def turn(self, *, longest: float | None = None) -> float:
+    def run_once(self, *, longest: float | None = None) -> float:
         """Apply queued commands, run the frames due since the last call, and publish.
 
         Args:
@@ -198,7 +198,7 @@ class Session:
         self._before = self._view_state.capture()[0] if self._speed < 1.0 and not self._late else None
         self._view_state.forces.wanted = self._seq <= self._force_until
         try:
-            self._view_state.step(self._dt, self._look_on if self._late else None)
+            self._view_state.step(self._dt, self._observe if self._late else None)
         except SketchError as error:
             self._error = None if self._view_state.mend(error) else str(error)
         except PyverletError as error:
@@ -318,14 +318,14 @@ class Session:
             self._busy = text
             self._publish()
 
-    def _publish(self, moment: Moment | None = None) -> None:
+    def _publish(self, snapshot: SubstepSnapshot | None = None) -> None:
         self._seq += 1
         self._pacing.made(time.perf_counter())
-        if moment is None:
+        if snapshot is None:
             self.latest = self._picture()
         else:  # readouts of the world only when a frame belongs to the last picture
-            status = replace(self._status, time=moment.time, **controls.read(self._view_state.worlds[0]))
-            self.latest = self.latest.moved(moment, self._seq, status, velocity=self._seq <= self._velocity_until)
+            status = replace(self._status, time=snapshot.time, **controls.read(self._view_state.worlds[0]))
+            self.latest = self.latest.moved(snapshot, self._seq, status, velocity=self._seq <= self._velocity_until)
         for listener in self._listeners:
             listener()
 
@@ -336,12 +336,12 @@ class Session:
         else:
             self._publish()
 
-    def _look_on(self, moment: Moment) -> None:
+    def _observe(self, snapshot: SubstepSnapshot) -> None:
         """Called between two substeps of a frame that takes longer than a picture."""
         if not self._paused:  # single steps show the state when they were requested
             self._apply_each(self._tasks.while_(self._view_state.takes_at_once))
         if self._wanted() and self._due() and self._view_state.shape_is_current:
-            self._publish(moment)
+            self._publish(snapshot)
 
     def _wanted(self) -> bool:
         """Whether the world is slow and a viewer that has the last picture waits for more."""
@@ -372,8 +372,10 @@ class Session:
         if self._speed == 1.0 or self._paused or before is None or list(map(len, before)) != list(map(len, now)):
             return now
         alpha = np.float32(self._clock.alpha)
-        seams = [world.boundary.seam for world in self._view_state.worlds]
-        return [seam.wrapped(a + alpha * seam.nearest(b - a)) for a, b, seam in zip(before, now, seams, strict=True)]
+        periodic = [world.boundary.periodic for world in self._view_state.worlds]
+        return [
+            periodic.wrapped(a + alpha * periodic.nearest(b - a)) for a, b, periodic in zip(before, now, periodic, strict=True)
+        ]
 
 
 class _Stopped(Exception):  # noqa: N818  (no error: it was asked for)

@@ -6,14 +6,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from pyverlet.ground.constants import FRAME_BUDGET_MS
-from pyverlet.ground.errors import InputError
-from pyverlet.ground.time_limit import TimeLimit
+from pyverlet.common.constants import FRAME_BUDGET_MS
+from pyverlet.common.errors import InputError
+from pyverlet.common.time_limit import TimeLimit
 from pyverlet.laws.obstacles import Outline
 from pyverlet.picture import Pen
 from pyverlet.picture.pen import Drawing
 from pyverlet.scenes.sketch import Sketch, SketchError, Updates
-from pyverlet.state.seam import Seam
+from pyverlet.state.periodicity import Periodicity
 from pyverlet.state.state import EVERYONE
 from pyverlet.viewers import commands as asked
 from pyverlet.viewers import controls
@@ -24,7 +24,7 @@ from pyverlet.viewers.layout import Layout
 from pyverlet.viewers.pointers import History, Pointers
 from pyverlet.viewers.presentation import Presentation
 from pyverlet.viewers.task_queue import Item
-from pyverlet.world.moments import Moment
+from pyverlet.world.substep_snapshot import SubstepSnapshot
 
 GREY = 0x9A  # R, G and B of circles added later
 
@@ -72,7 +72,7 @@ class ViewState:
         """(n, 2) positions in the picture, from those of each world."""
         return _joined([self.layout.place(k, position) for k, position in enumerate(positions)])
 
-    def step(self, dt: float, observer: Callable[[Moment], None] | None = None) -> None:
+    def step(self, dt: float, observer: Callable[[SubstepSnapshot], None] | None = None) -> None:
         """Run one frame of every world, with pointers following the mouse.
 
         `observer` is called between the substeps of a single world, unless obstacles move, whose motion is known per frame.
@@ -80,18 +80,18 @@ class ViewState:
         self.pointers.move(self.layout.size)
         world = self.worlds[0]
 
-        def between(moment: Moment) -> None:
+        def between(snapshot: SubstepSnapshot) -> None:
             assert observer
-            observer(moment)
+            observer(snapshot)
             self.pointers.move(self.layout.size)  # the pointers may have moved
 
         if len(self.worlds) == 1 and not any(obstacle.moves for obstacle in world.obstacles):
-            world.onlooker = observer and between
+            world.observer = observer and between
         try:
             with self.forces.look():
                 self.panels.step(dt)
         finally:
-            world.onlooker = None
+            world.observer = None
 
     def do(self, command: Command) -> None:
         """Apply a command about the worlds; commands about time belong to the session."""
@@ -244,7 +244,7 @@ class ViewState:
         outlines: list[tuple[tuple[float, float], ...]] = []
         lines: list[tuple[tuple[float, float], tuple[float, float]]] = []
         panels: list[PanelShape] = []
-        seams: list[tuple[int, int, Seam]] = []
+        periodicities: list[tuple[int, int, Periodicity]] = []
         first, apart = 0, []
         callbacks, worlds = self.presentation.callbacks, self.worlds
         for k, (panel, world) in enumerate(zip(self.panels, self.worlds, strict=True)):
@@ -254,8 +254,8 @@ class ViewState:
                 lines.append(((extent[0] + dx, self.panels.line + dy), (extent[2] + dx, self.panels.line + dy)))
             if len(self.panels) > 1:
                 panels.append(PanelShape(panel.name, first, len(world), self._start_energies[k], self.layout.strip(k)))
-            if seam := world.boundary.seam:
-                seams.append((first, len(world), seam._replace(low_x=seam.low_x + dx, low_y=seam.low_y + dy)))
+            if periodic := world.boundary.periodic:
+                periodicities.append((first, len(world), periodic._replace(low_x=periodic.low_x + dx, low_y=periodic.low_y + dy)))
             apart.append(self._apart[k] + first)
             first += len(world)
         kinds = np.concatenate(
@@ -282,7 +282,7 @@ class ViewState:
             kinds=None if (kinds == (1, EVERYONE)).all() else _kept(kinds),
             apart=_kept(np.concatenate(apart).astype(np.uint32)),
             colours=self._colours(),
-            seams=tuple(seams),
+            periodicities=tuple(periodicities),
         )
 
     def _bounded(self) -> bool:

@@ -9,8 +9,8 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from pyverlet.ground.errors import PyverletError
-from pyverlet.ground.time_limit import TimeLimit, TooLong, interrupt
+from pyverlet.common.errors import PyverletError
+from pyverlet.common.time_limit import TimeLimit, TooLong, interrupt
 from pyverlet.scenes.sketch import Sketch
 from pyverlet.viewers.presentation import Presentation, Repertoire
 from pyverlet.viewers.session import Session

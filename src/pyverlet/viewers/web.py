@@ -16,7 +16,7 @@ from starlette.responses import Response
 from starlette.routing import Route, WebSocketRoute
 from starlette.websockets import WebSocket, WebSocketDisconnect
 
-from pyverlet.ground.errors import InputError
+from pyverlet.common.errors import InputError
 from pyverlet.viewers.commands import Release, ViewOptions
 from pyverlet.viewers.frames import Frame
 from pyverlet.viewers.protocol import Display, Encoder

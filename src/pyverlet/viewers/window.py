@@ -6,8 +6,8 @@ import time
 from functools import partial
 from typing import Any
 
-from pyverlet.ground.errors import InputError, PyverletError
-from pyverlet.ground.outside import require
+from pyverlet.common.errors import InputError, PyverletError
+from pyverlet.common.outside import require
 from pyverlet.picture import View
 from pyverlet.picture.raster import check_size
 from pyverlet.viewers.commands import Drag, Pause, Poke, Release, Reset, Step
@@ -80,18 +80,18 @@ class Window:
         """Run until the window is closed."""
         try:
             while not self.ended:
-                self.turn()
+                self.run_once()
         finally:
             for command in (Pause(True), Release(POINTER)):
                 self._session.submit(command)
-            self._session.turn()
+            self._session.run_once()
             self._pygame.display.quit()
 
-    def turn(self) -> None:
+    def run_once(self) -> None:
         """Apply input, run the frames that are due, and show one picture."""
         for event in self._pygame.event.get():
             self._apply(event)
-        rest = min(self._session.turn(), self._dt)
+        rest = min(self._session.run_once(), self._dt)
         began = time.perf_counter()
         self._show()
         time.sleep(max(rest - (time.perf_counter() - began), 0.0))

@@ -12,12 +12,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from pyverlet.ground import checks
-from pyverlet.ground.checked import Checked
-from pyverlet.ground.errors import InputError
-from pyverlet.ground.lists import CheckedList
-from pyverlet.ground.shown import Shown
-from pyverlet.laws.rooms import Boundary, Box, Circle
+from pyverlet.common import checks
+from pyverlet.common.checked import Checked
+from pyverlet.common.errors import InputError
+from pyverlet.common.lists import CheckedList
+from pyverlet.common.shown import Shown
+from pyverlet.laws.boundaries import Boundary, Box, Circle
 from pyverlet.world.queries import free_in_order, on_top
 
 if TYPE_CHECKING:
@@ -132,7 +132,7 @@ class Emitter(Actor):
     radius = Checked(_sizes)
     mass: Checked[float | None] = Checked(checks.number, above=0.0, none=True)
     density: Checked[float | None] = Checked(checks.number, above=0.0, none=True)
-    most: Checked[int | None] = Checked(checks.whole, least=0, none=True)
+    most: Checked[int | None] = Checked(checks.integer, least=0, none=True)
 
     def __init__(
         self,
@@ -152,7 +152,7 @@ class Emitter(Actor):
         if mass is not None and density is not None:
             raise InputError(f"density is {density!r} and mass is {mass!r}; allowed is one of them, not both")
         self.mass = 1.0 if mass is None and density is None else mass
-        self._rng = np.random.default_rng(checks.whole("seed", seed, least=0))
+        self._rng = np.random.default_rng(checks.integer("seed", seed, least=0))
         self._due = 0.0
         self.emitted = 0
 
@@ -166,7 +166,7 @@ class Emitter(Actor):
         allowed = world.is_free(places)
         places, sizes, near = places[allowed], sizes[allowed], self._near(world)
         position, radius = np.concatenate((world.position[near], places)), np.concatenate((world.radius[near], sizes))
-        pairs = on_top(position, radius, len(near), world.boundary.seam) - (len(near), 0)
+        pairs = on_top(position, radius, len(near), world.boundary.periodic) - (len(near), 0)
         taken = np.flatnonzero(free_in_order(pairs, len(near), np.ones(len(places), bool)))[:wanted]
         if found := len(taken):
             weight = {"mass": self.mass, "density": self.density}
@@ -197,7 +197,7 @@ class Emitter(Actor):
         """Indices of the world's particles that may reach into the region."""
         x0, y0, x1, y1 = self.region.extent()
         middle = np.array(((x0 + x1) / 2, (y0 + y1) / 2))
-        (x, y), r = (middle + world.boundary.seam.nearest(world.position - middle)).T, world.radius
+        (x, y), r = (middle + world.boundary.periodic.nearest(world.position - middle)).T, world.radius
         return np.flatnonzero((x + r > x0) & (x - r < x1) & (y + r > y0) & (y - r < y1))
 
 
@@ -233,9 +233,9 @@ class Sink(Actor):
         where = np.searchsorted(number, world.number).clip(max=len(number) - 1)
         known = np.flatnonzero(number[where] == world.number)
         start, end = start[where[known]].astype(float), world.position[known].astype(float)
-        way = world.boundary.seam.nearest(end - start)
+        way = world.boundary.periodic.nearest(end - start)
         crossed = self._crossed(start, start + way)
-        if world.boundary.seam:  # the part of the path beyond the periodic boundary
+        if world.boundary.periodic:  # the part of the path beyond the periodic boundary
             crossed |= self._crossed(end - way, end)
         crossed &= ~self._takes(end)  # these are removed before the next frame
         self._remove(world, known[crossed])

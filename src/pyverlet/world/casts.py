@@ -7,17 +7,17 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from pyverlet.common import checks
+from pyverlet.common.arrays import Floats, Indices
+from pyverlet.common.errors import InputError
+from pyverlet.common.shown import count
+from pyverlet.common.step_lock import between_frames
+from pyverlet.common.threads import max_threads
 from pyverlet.core import unit
-from pyverlet.ground import checks
-from pyverlet.ground.arrays import Floats, Indices
-from pyverlet.ground.errors import InputError
-from pyverlet.ground.shown import count
-from pyverlet.ground.step_lock import of_one_frame
-from pyverlet.ground.threads import max_threads
-from pyverlet.laws.naive import Naive
+from pyverlet.laws.boundaries import Boundary, Box, Circle, Periodic
 from pyverlet.laws.obstacles import ObstacleArrays, Obstacles
-from pyverlet.laws.rooms import Boundary, Box, Circle, Periodic
-from pyverlet.state.state import EVERYONE, meet
+from pyverlet.laws.textbook import TextbookBoundary
+from pyverlet.state.state import EVERYONE, may_collide
 from pyverlet.world.queries import Queries, alike, circles
 
 Kinds = tuple[NDArray[np.uint32], NDArray[np.uint32]]
@@ -82,7 +82,7 @@ class Casts(Queries):
         """
         return self.circle_cast(origin, direction, 0.0, length, **among)
 
-    @of_one_frame
+    @between_frames
     def circle_cast(
         self,
         origin: ArrayLike,
@@ -128,7 +128,7 @@ class Casts(Queries):
         for name, value in (("particles", particles), ("obstacles", obstacles), ("walls", walls)):
             checks.flag(name, value)
         s, largest, count = self._state, float(size.max(initial=0.0)), len(start)
-        rays = s.seam.wrapped(start), *map(np.ascontiguousarray, (heading, far, size, *_bits(category, mask, count)))
+        rays = s.periodic.wrapped(start), *map(np.ascontiguousarray, (heading, far, size, *_bits(category, mask, count)))
         seen = discs = None
         if particles and len(s):
             seen, cells = self._seen(count, float(s.radius.max()) + largest, largest)
@@ -139,10 +139,10 @@ class Casts(Queries):
         particle, obstacle, wall = (np.empty(count, np.int64) for _ in range(3))
         distance, normal, point = np.empty(count), np.empty((count, 2)), np.empty((count, 2))
         found = particle, obstacle, wall, distance, normal, point
-        unit("tools", s.dtype).cast(rays, discs, bodies, _walls(self.boundary, walls), tuple(s.seam), threads, *found)
-        return RayHits(seen.named(particle) if seen else particle, distance, normal, obstacle, wall, s.seam.wrapped(point))
+        unit("tools", s.dtype).cast(rays, discs, bodies, _walls(self.boundary, walls), tuple(s.periodic), threads, *found)
+        return RayHits(seen.named(particle) if seen else particle, distance, normal, obstacle, wall, s.periodic.wrapped(point))
 
-    @of_one_frame
+    @between_frames
     def overlap_area(
         self, center: ArrayLike, radius: ArrayLike, *, category: ArrayLike = EVERYONE, mask: ArrayLike = EVERYONE
     ) -> Overlaps:
@@ -158,16 +158,16 @@ class Casts(Queries):
         own, s, many = _bits(category, mask, len(middle)), self._state, np.ndim(center) > 1 or np.ndim(radius) > 0
         q, i, _ = self._discs_at(middle, size)
         category, mask = (np.broadcast_to(each, len(middle)) for each in own)
-        seen = meet(category[q], mask[q], s.category[i], s.mask[i])
+        seen = may_collide(category[q], mask[q], s.category[i], s.mask[i])
         there = self._obstacle_arrays.near(middle, size, *own)
-        room = self.boundary.room if isinstance(self.boundary, Naive) else self.boundary
-        facing = room.facing(s.seam.wrapped(middle))
+        boundary = self.boundary.room if isinstance(self.boundary, TextbookBoundary) else self.boundary
+        facing = boundary.facing(s.periodic.wrapped(middle))
         near = np.zeros((len(middle), 0), bool) if facing is None else facing[0] <= size[:, None]
-        side = np.argwhere(near & meet(*own, *_walls(self.boundary)[3:])[:, None])
+        side = np.argwhere(near & may_collide(*own, *_walls(self.boundary)[3:])[:, None])
         found = np.column_stack((q, i))[seen], np.column_stack((there.row, there.obstacle)), side
         return Overlaps(*(rows if many else np.ascontiguousarray(rows[:, 1]) for rows in found))
 
-    @of_one_frame
+    @between_frames
     def is_free(
         self, position: ArrayLike, radius: ArrayLike | None = None, *, category: ArrayLike = EVERYONE, mask: ArrayLike = EVERYONE
     ) -> NDArray[np.bool_]:
@@ -189,13 +189,13 @@ class Casts(Queries):
         return np.asarray(np.isinf(hits.distance) & ~self.boundary.outside(where))
 
 
-def _walls(room: Boundary, wanted: bool = True) -> tuple[int, int, Floats, int, int]:
+def _walls(boundary: Boundary, wanted: bool = True) -> tuple[int, int, Floats, int, int]:
     """Sides as `core.casting` takes them: first and end, box corners or centre and radius, m; category and mask.
 
     User-defined rooms have no sides and all bits.
     """
-    shape = room.room if isinstance(room, Naive) else room
-    kinds = getattr(room, "category", EVERYONE), getattr(room, "mask", EVERYONE)
+    shape = boundary.room if isinstance(boundary, TextbookBoundary) else boundary
+    kinds = getattr(boundary, "category", EVERYONE), getattr(boundary, "mask", EVERYONE)
     if isinstance(shape, Circle) and wanted:
         return 4, 5, np.array((*shape.center, shape.radius)), *kinds
     if isinstance(shape, Box | Periodic) and wanted:

@@ -6,10 +6,10 @@ from collections import deque
 
 import numpy as np
 
-from pyverlet.ground import checks
-from pyverlet.ground.checked import Checked
-from pyverlet.ground.constants import FRAME_BUDGET_MS
-from pyverlet.ground.shown import Shown
+from pyverlet.common import checks
+from pyverlet.common.checked import Checked
+from pyverlet.common.constants import FRAME_BUDGET_MS
+from pyverlet.common.shown import Shown
 
 
 class Clock(Shown):
@@ -28,7 +28,7 @@ class Clock(Shown):
     _shows = ("dt", "max_catch_up", "dropped")
 
     dt = Checked(checks.number, above=0.0)
-    max_catch_up = Checked(checks.whole)
+    max_catch_up = Checked(checks.integer)
 
     def __init__(self, *, dt: float = 1 / 60, max_catch_up: int = 4) -> None:
         self.dt, self.max_catch_up = dt, max_catch_up
@@ -67,7 +67,7 @@ class FrameBudget(Shown):
         self.limit_ms = limit_ms
         self.frames = 0
         self.over = 0
-        self._recent: deque[float] = deque(maxlen=checks.whole("window", window, least=2))
+        self._recent: deque[float] = deque(maxlen=checks.integer("window", window, least=2))
 
     def record(self, ms: float) -> None:
         """Count one frame that took `ms` milliseconds of physics."""

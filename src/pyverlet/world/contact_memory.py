@@ -6,7 +6,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from pyverlet.ground.arrays import Array
+from pyverlet.common.arrays import Array
 from pyverlet.world.sleepers import Remembered
 
 STEP = ("kick", "h", "hertz", "finer", "steps", "parting", "typical", "strongest")
@@ -46,8 +46,8 @@ class Memory(NamedTuple):
     @classmethod
     def empty(cls, dtype: np.dtype[Any]) -> Memory:
         """No contact remembers anything."""
-        rows, none, nobody = np.empty((0, 2), dtype), np.empty((0, 3), dtype), np.empty((0, 2), np.int32)
-        contacts = nobody, np.empty((0, 4), dtype), nobody, np.empty((0, 3)), none
+        rows, none, no_pairs = np.empty((0, 2), dtype), np.empty((0, 3), dtype), np.empty((0, 2), np.int32)
+        contacts = no_pairs, np.empty((0, 4), dtype), no_pairs, np.empty((0, 3)), none
         return cls(
             *contacts, kick=0.0, h=0.0, hertz=0.0, finer=0.0, steps=0.0, parting=0.0, typical=0.0, strongest=0.0,
             asleep=Remembered.nothing(dtype), listed=rows, checked=rows,

@@ -11,10 +11,10 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from pyverlet.ground import pickling
-from pyverlet.ground.arrays import Array
-from pyverlet.ground.errors import InputError
-from pyverlet.ground.shown import count
+from pyverlet.common import pickling
+from pyverlet.common.arrays import Array
+from pyverlet.common.errors import InputError
+from pyverlet.common.shown import count
 from pyverlet.laws.collisions import find_contacts
 from pyverlet.world.actors import Actor
 
@@ -100,10 +100,10 @@ class ContactRule(Actor):
         kept, fresh = near[met & np.isin(near, self._ignored)], ~met
         self._met = near[met | meets]
         if fresh.any():
-            told = NewContacts(pairs[fresh, 0], pairs[fresh, 1], meets[fresh], *(column[fresh] for column in where))
-            answer = self._function(world, told)
+            new = NewContacts(pairs[fresh, 0], pairs[fresh, 1], meets[fresh], *(column[fresh] for column in where))
+            answer = self._function(world, new)
             if answer is not None:
-                kept = np.concatenate((kept, near[fresh][self._checked(answer, len(told.a))]))
+                kept = np.concatenate((kept, near[fresh][self._checked(answer, len(new.a))]))
         self._ignored = kept
 
     def _checked(self, answer: Any, pairs: int) -> Array:
@@ -148,7 +148,7 @@ def _near(world: World, dt: float) -> tuple[Array, Array, Array, Array, Array]:
     common = np.median(state.velocity, axis=0) if len(state) else 0.0  # a common velocity brings no pair closer
     pairs = find_contacts(state, (state.radius + dt * np.hypot(*(state.velocity - common).T)).astype(state.dtype))
     i, j = pairs.T
-    way = state.seam.nearest(state.position[j].astype(float) - state.position[i])
+    way = state.periodic.nearest(state.position[j].astype(float) - state.position[i])
     against = state.velocity[j].astype(float) - state.velocity[i]
     # The first time at which |way + against t| = r_i + r_j.
     square, along = (against**2).sum(axis=1), (way * against).sum(axis=1)

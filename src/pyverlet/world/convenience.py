@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING, Any
 
 from numpy.typing import NDArray
 
-from pyverlet.ground import checks
-from pyverlet.ground.errors import InputError
-from pyverlet.ground.shown import count, text
+from pyverlet.common import checks
+from pyverlet.common.errors import InputError
+from pyverlet.common.shown import count, text
 
 if TYPE_CHECKING:
     from pyverlet.world.world import World
@@ -21,7 +21,7 @@ MOST = 12
 """Most curves of a graph that can be told apart."""
 
 
-class Doors:
+class ConvenienceMethods:
     """Methods of a world for running, pictures and films; their modules are imported on first use."""
 
     def run(self: World, *, seconds: float, dt: float = 1 / 60) -> None:  # type: ignore[misc]
@@ -45,7 +45,7 @@ class Doors:
     def __setstate__(self: World, state: dict[str, Any]) -> None:  # type: ignore[misc]
         from pyverlet.world import copies
 
-        copies.take_up(self, state)
+        copies.restore_state(self, state)
 
     def __deepcopy__(self: World, memo: dict[Any, Any]) -> World:  # type: ignore[misc]
         from pyverlet.world import copies

@@ -1,7 +1,7 @@
 """Pickles and copies of worlds: the moving state by `parts`, and the objects in the world as they are.
 
 The particles' `State` and the lists of a world are pickled as themselves, so that groups and links pickled with a world still
-refer to its particles. Compiled code, the profile and the onlooker are not copied.
+refer to its particles. Compiled code, the profile and the observer are not copied.
 """
 
 from __future__ import annotations
@@ -11,8 +11,8 @@ import inspect
 from functools import cache
 from typing import Any
 
-from pyverlet.ground import pickling
-from pyverlet.ground.threads import max_threads
+from pyverlet.common import pickling
+from pyverlet.common.threads import max_threads
 from pyverlet.laws.obstacles import ObstacleArrays
 from pyverlet.world import parts as apart
 from pyverlet.world.saved import INTO
@@ -25,7 +25,7 @@ def settings(world: World) -> dict[str, Any]:
     """Numbers and text that `World` is constructed with."""
     return {
         "dtype": world.dtype.name, "gravity": list(world.gravity), "substeps": world.substeps, "threads": world._threads,
-        "ledger": world.keeps_ledger, "events": world.tells_events, "contacts": world._touches is not None,
+        "ledger": world.keeps_ledger, "events": world.records_events, "contacts": world._contact_records is not None,
         "sleep": world._sleep is not None,
     }  # fmt: skip
 
@@ -62,7 +62,7 @@ def check(world: World) -> None:
         pickling.check(f"what is watched as {label!r}", *filter(inspect.isfunction, (function,)))
 
 
-def take_up(world: World, given: dict[str, Any]) -> None:
+def restore_state(world: World, given: dict[str, Any]) -> None:
     """Turn a bare object into the world of these `contents`, which own their objects from now on."""
     options, objects = given["settings"], given["objects"]
     most = max_threads()
@@ -86,5 +86,5 @@ def copied(world: World, memo: dict[Any, Any]) -> World:
     again = memo[id(world)] = type(world).__new__(type(world))
     with world.held():
         given = contents(world)
-        take_up(again, copy.deepcopy(given, memo))
+        restore_state(again, copy.deepcopy(given, memo))
     return again

@@ -7,11 +7,11 @@ from typing import Any
 import numpy as np
 
 from pyverlet import core
-from pyverlet.ground import memory
-from pyverlet.ground.arrays import Array
-from pyverlet.ground.constants import SKIN
+from pyverlet.common import memory
+from pyverlet.common.arrays import Array
+from pyverlet.common.constants import SKIN
 from pyverlet.laws.obstacles import ObstacleArrays
-from pyverlet.state.slots import Slots
+from pyverlet.state.sorted_state import SortedState
 from pyverlet.world.contact_memory import STEP, Memory, columns_of
 from pyverlet.world.materials import ease_of, materials_of, mixed, names_of, numbers_of, resist, skin_of, walls_of
 from pyverlet.world.obstacle_rows import ObstacleRows
@@ -19,14 +19,14 @@ from pyverlet.world.sleepers import Remembered
 
 SORTED_FROM = 1024
 UNSORTED = 0.2
-"""From SORTED_FROM slots on, slots are sorted by cells if this fraction of them is followed by one that belongs before it."""
+"""From SORTED_FROM rows on, rows are sorted by cells if this fraction of them is followed by one that belongs before it."""
 
 
 _NONE = np.empty(0, np.uint8)
 
 
 class CoreArrays:
-    """The engine of one world and the arrays that it works on: slots, and contact state that persists between frames.
+    """The engine of one world and the arrays that it works on: rows, and contact state that persists between frames.
 
     Attributes:
         engine: steps particles; see `core.engine_object`.
@@ -35,7 +35,7 @@ class CoreArrays:
         hertz, finer: spring frequency of contacts, and for how long, s, a higher one would have been possible.
         parting: J that particles which the user has placed inside each other may still gain, see `laws.limiter`.
         typical, strongest: m/s^2, of `ForceSum`, after the last frame; used for decisions before forces are evaluated.
-        gave, gave_spin: (slots, 2) m/s and (slots,) rad/s that contacts gave in the last substep.
+        gave, gave_spin: (n, 2) m/s and (n,) rad/s that contacts gave in the last substep.
         parts: number of threads of a frame.
         free: whether any particle is not pinned.
         largest, mean_radius: m. unequal: whether masses differ, pinned particles aside.
@@ -97,14 +97,14 @@ class CoreArrays:
         self.gave, self.gave_spin = columns_of(memory.given)
         self.asleep = memory.asleep
         vars(self).update((name, getattr(memory, name)) for name in STEP)
-        self._made = -1  # `Slots.revision` of the engine's arrays; -1: none yet
+        self._made = -1  # `SortedState.revision` of the engine's arrays; -1: none yet
         self._collisions: Any = None
         self._names: list[str] = []  # of materials
         self._most_friction = self._most_rolling = 0.0  # for two circles without values of their own
         self._skin: float | None = -1.0
         self._still: tuple[int, Array] | None = None
 
-    def note(self, state: Slots) -> Any:
+    def note(self, state: SortedState) -> Any:
         """State for `go_back` if this frame is refused: all but the impulses of contacts. Pinned particles have none."""
         if len(state.island) and self._particle is state.particle:
             known: Any = state.free
@@ -139,23 +139,23 @@ class CoreArrays:
         """`surfaces` and `pushes` of `Memory`."""
         if self._kept_surfaces is not None:
             return self._kept_surfaces
-        slot, surface, pushes = self.engine.take_surfaces()
-        return np.column_stack((self._particle[slot], surface)).astype(np.int32), pushes
+        sorted_index, surface, pushes = self.engine.take_surfaces()
+        return np.column_stack((self._particle[sorted_index], surface)).astype(np.int32), pushes
 
-    def renumber(self, now: Array, state: Slots) -> None:
-        """Renumber particles, now at `now` (n,) or removed (-1), in the stored contact state and then in the slots."""
+    def renumber(self, now: Array, state: SortedState) -> None:
+        """Renumber particles, now at `now` (n,) or removed (-1), in the stored contact state and then in the rows."""
         gone, self.h = np.flatnonzero(now < 0), 0.0
         left = memory.without(state.particle, gone)
         if self._kept is not None:
             self.restore(self.save().renumbered(now))
         else:
-            slots, particle = left if self._particle is state.particle else memory.without(self._particle, gone)
-            self._move(memory.places(slots, len(self._particle), np.int32), slots, None, particle)
+            index, particle = left if self._particle is state.particle else memory.without(self._particle, gone)
+            self._move(memory.places(index, len(self._particle), np.int32), index, None, particle)
             self.asleep = self.asleep.renumbered(now)
         state.forget(gone, *left)
 
     def _move(self, place: Array, gone: Array, source: Array | None, particle: Array) -> None:
-        """Move what is stored for slot k to slot place[k], or drop it (-1). particle: the user's index in each new slot.
+        """Move what is stored for row k to row place[k], or drop it (-1). particle: the user's index of each new row.
 
         gone, source: as `memory.moved` takes them.
         """
@@ -179,15 +179,15 @@ class CoreArrays:
                 rows[moved[moved < known]] = np.nan
             self.restore(saved.renumbered(now)._replace(given=saved.given, listed=saved.listed, checked=saved.checked))
             return
-        slot = _places(self._particle)[lone[lone < known]]
-        self.gave[slot], self.gave_spin[slot] = 0, 0
+        sorted_index = _places(self._particle)[lone[lone < known]]
+        self.gave[sorted_index], self.gave_spin[sorted_index] = 0, 0
         place = np.where(now[self._particle] >= 0, np.arange(known, dtype=np.int32), np.int32(-1))
         self.engine.move_particles(place, np.flatnonzero(place < 0), place, known, self.parts)
         self.asleep = self.asleep.renumbered(now)
 
     def load(self, world: Any, dt: float) -> None:
         """Pass the particles and their materials to the engine for a frame of dt seconds."""
-        state, engine, collisions, forces = world._slots, self.engine, world.collisions, world._force_sum
+        state, engine, collisions, forces = world._sorted, self.engine, world.collisions, world._force_sum
         forces.typical, forces.strongest = self.typical, self.strongest
         parts = world._team.now
         if engine.threads < parts:
@@ -209,29 +209,29 @@ class CoreArrays:
             self._skin = skin
             if self._kept_list is None:
                 engine.set_skin(SKIN if self._skin is None else self._skin, self._skin is None)
-        engine.set_room(*walls_of(world.boundary, self._names))
+        engine.set_boundary(*walls_of(world.boundary, self._names))
         if world.boundary is not self._room:
-            engine.set_seam(*state.seam)
+            engine.set_periodic(*state.periodic)
             self._room = world.boundary
         self.follow_obstacles(world, dt)
         if self._kept_list is not None:
             engine.set_skin(self._kept_list[2][0], self._skin is None)
             engine.restore_list(*self._kept_list)
             self._kept_list = None
-        engine.mend_list(parts)
+        engine.patch_list(parts)
         if len(state) >= SORTED_FROM:
             self._sort(state)
         self._still = self.engine.take_still(not state.copied)
-        if state.seam:
+        if state.periodic:
             state.crossed = np.zeros(state.position.shape)
-            engine.follow_seam(state.crossed)
+            engine.follow_images(state.crossed)
 
     def still(self) -> Array:
-        """(blocks,) which slots neither the last frame nor the one before has changed; or empty."""
+        """(blocks,) which rows neither the last frame nor the one before has changed; or empty."""
         now = self.engine.take_still(True) if self._still else None
         return now[1] if self._still and now and self._still[0] == now[0] else _NONE
 
-    def set_aside(self, state: Slots) -> None:
+    def set_aside(self, state: SortedState) -> None:
         """Store the contact state of islands that have just fallen asleep."""
         at_rest, asleep = _at_rest(state)
         asleep[self.asleep.particle] = False  # already stored
@@ -241,11 +241,11 @@ class CoreArrays:
 
     def wake(self, world: Any) -> None:
         """Restore contacts of islands that woke in the middle of a frame."""
-        self._wake(world._slots)
-        self._follow(world._slots)
+        self._wake(world._sorted)
+        self._follow(world._sorted)
         self._set_materials(world)
 
-    def _wake(self, state: Slots) -> None:
+    def _wake(self, state: SortedState) -> None:
         """Restore the stored contact state of particles that are awake now."""
         if not len(self.asleep.particle) or len(self.asleep.particle) == len(state.asleep):
             return
@@ -261,14 +261,14 @@ class CoreArrays:
 
     def _remember(self, what: Remembered) -> None:
         """Replace the contact state; of a particle that occurs twice the last entry counts."""
-        slot = _places(self._particle)[what.particle]
+        sorted_index = _places(self._particle)[what.particle]
         self.gave[:], self.gave_spin[:] = 0, 0
-        self.gave[slot], self.gave_spin[slot] = what.given[:, :2], what.given[:, 2]
+        self.gave[sorted_index], self.gave_spin[sorted_index] = what.given[:, :2], what.given[:, 2]
         self._kept, self._kept_surfaces = (what.pairs, what.values), (what.surfaces, what.pushes)
         self.engine.forget_list()
 
-    def _sort(self, state: Slots) -> None:
-        """Sort slots by cells if many are out of order; the pair list stays the same."""
+    def _sort(self, state: SortedState) -> None:
+        """Sort rows by cells if many are out of order; the pair list stays the same."""
         falls, order = self.engine.order()
         if falls > UNSORTED * len(state):
             order = order.astype(np.int32)
@@ -280,16 +280,16 @@ class CoreArrays:
             self._hold(state)
             self._give_surfaces(*surfaces)
 
-    def _follow(self, state: Slots) -> None:
-        """Reorder the stored contact state to the current order of slots."""
+    def _follow(self, state: SortedState) -> None:
+        """Reorder the stored contact state to the current order of rows."""
         if self._kept is None:
-            known, nobody = len(self._particle), np.empty(0, np.int64)
+            known, no_rows = len(self._particle), np.empty(0, np.int64)
             if not np.array_equal(self._particle, state.particle[:known]):
                 place, source = _places(state.particle)[self._particle], np.full(len(state), -1)
                 source[place] = np.arange(known)
-                self._move(place, nobody, source, state.particle)
+                self._move(place, no_rows, source, state.particle)
             elif known < len(state):
-                self._move(np.arange(known, dtype=np.int32), nobody, None, state.particle)
+                self._move(np.arange(known, dtype=np.int32), no_rows, None, state.particle)
             self._particle = state.particle
             self._hold(state)
             return
@@ -314,10 +314,10 @@ class CoreArrays:
         self._find_surfaces(_places(self._particle)[surfaces[:, 0]], surfaces[:, 1], pushes)
         self._kept_surfaces = None
 
-    def _find_surfaces(self, slot: Array, surface: Array, pushes: Array) -> None:
-        """Have the engine match these contacts of slots, -1 for none, when it next lists surfaces."""
-        order = np.argsort(slot, kind="stable")[np.count_nonzero(slot < 0) :]
-        self.engine.give_surfaces(slot[order].astype(np.int32), surface[order], pushes[order])
+    def _find_surfaces(self, sorted_index: Array, surface: Array, pushes: Array) -> None:
+        """Have the engine match these contacts of rows, -1 for none, when it next lists surfaces."""
+        order = np.argsort(sorted_index, kind="stable")[np.count_nonzero(sorted_index < 0) :]
+        self.engine.give_surfaces(sorted_index[order].astype(np.int32), surface[order], pushes[order])
 
     def follow_obstacles(self, world: Any, dt: float) -> None:
         """Pass the current obstacles to the engine for a frame of dt seconds."""
@@ -329,9 +329,9 @@ class CoreArrays:
             held = surfaces[:, 1] >= 0
             self._give_surfaces(surfaces[held], pushes[held])
             self.asleep = self.asleep.at_surfaces(now)  # removed sensors wake no particle
-        room, state, arrays = world.boundary, world._slots, world._obstacle_arrays
-        self.rolls = arrays.rolls or resist(room, "rolling_resistance", self._most_rolling, state.most_rolling)
-        has_friction = arrays.rough or resist(room, "friction", self._most_friction, state.most_friction)
+        boundary, state, arrays = world.boundary, world._sorted, world._obstacle_arrays
+        self.rolls = arrays.rolls or resist(boundary, "rolling_resistance", self._most_rolling, state.most_rolling)
+        has_friction = arrays.rough or resist(boundary, "friction", self._most_friction, state.most_friction)
         self.rough = self.rolls or has_friction or world.links.pool.has_motor
         self.engine.set_rolls(self.rolls)
 
@@ -342,7 +342,7 @@ class CoreArrays:
                 if (others[surfaces[:, 1]] & (pushes[:, 0] > 0)).any():
                     self.h = 0.0
 
-    def _hold(self, state: Slots) -> None:
+    def _hold(self, state: SortedState) -> None:
         """Pass the current arrays to the engine."""
         made = {
             "own_restitution": state.restitution, "own_friction": state.friction, "own_rolling": state.rolling_resistance,
@@ -358,9 +358,9 @@ class CoreArrays:
 
     def _set_materials(self, world: Any) -> None:
         """Pass changed materials to the engine; pinned particles lose their last contact impulses."""
-        held = world._slots.inverse_mass == 0
+        held = world._sorted.inverse_mass == 0
         self.gave[held], self.gave_spin[held] = 0, 0
-        state = world._slots
+        state = world._sorted
         self._made, self._collisions = state.revision, world.collisions
         self.free = bool((state.inverse_mass > 0).any())
         materials = materials_of(state, world._state.shown["radius"], world.collisions)
@@ -376,13 +376,13 @@ def _unequal(inverse_mass: Array) -> bool:
 
 
 def _places(particle: Array) -> Array:
-    """The slot of each of the user's particles."""
+    """The row of each of the user's particles."""
     place = np.zeros(len(particle), np.int32)
     place[particle] = np.arange(len(particle), dtype=np.int32)
     return place
 
 
-def _at_rest(state: Slots) -> tuple[Array, Array]:
+def _at_rest(state: SortedState) -> tuple[Array, Array]:
     """By the user's index: which particles cannot move, and which of these sleep."""
     rest, asleep = np.zeros((2, len(state)), bool)
     rest[state.particle], asleep[state.particle] = state.inverse_mass == 0, state.island >= 0

@@ -6,12 +6,12 @@ from typing import Any
 
 import numpy as np
 
+from pyverlet.common.arrays import Array
 from pyverlet.core import unit
-from pyverlet.ground.arrays import Array
 from pyverlet.laws.links._link import REMEMBERED
 from pyverlet.laws.links._pool import DISTANCE, PIN, Pool
 from pyverlet.laws.links._set import partners
-from pyverlet.state.slots import Slots
+from pyverlet.state.sorted_state import SortedState
 
 NUMBERS = ("stiffness", "damping", "strength", *REMEMBERED)
 
@@ -36,8 +36,8 @@ class CoreLinks:
 
     def forget(self) -> None:
         """Discard the rows, so that the pool is read anew."""
-        self._edits = self._revision = -1  # of the pool and of the slots, when the rows were made
-        self._order: Array | None = None  # the order of slots then
+        self._edits = self._revision = -1  # of the pool and of the rows, when the rows were made
+        self._order: Array | None = None  # the order of rows then
         self._pinned = np.zeros(0, bool)
 
     def keep_apart(self, world: Any, engine: Any) -> None:
@@ -59,14 +59,14 @@ class CoreLinks:
         """Pass the current links to the engine for frames of so many substeps."""
         if not (world.links or self.rows):
             return
-        links, seam = world.links, world._slots.seam
-        changed = self._follow(links.pool, world._slots, world._state.shown["mass"])
-        if changed or (links.iterations, substeps, seam) != self._known:
-            self._known = links.iterations, substeps, seam
-            engine.set_links(self.rows, links.iterations, substeps, *seam.period)
+        links, periodic = world.links, world._sorted.periodic
+        changed = self._follow(links.pool, world._sorted, world._state.shown["mass"])
+        if changed or (links.iterations, substeps, periodic) != self._known:
+            self._known = links.iterations, substeps, periodic
+            engine.set_links(self.rows, links.iterations, substeps, *periodic.period)
 
-    def _follow(self, pool: Pool, state: Slots, mass: Array) -> bool:
-        """Update the rows to the current links and order of slots; returns whether any array was replaced."""
+    def _follow(self, pool: Pool, state: SortedState, mass: Array) -> bool:
+        """Update the rows to the current links and order of rows; returns whether any array was replaced."""
         if not len(pool):
             changed, self.rows = self.rows is not None, None
             self.forget()
@@ -82,9 +82,9 @@ class CoreLinks:
         pool.live = [(row, self.rows[f"{prefix}intact"]) for prefix, row in self._sources.items()]
         if self._order is not state.particle:
             self._order = state.particle
-            slot_of = np.empty(len(state.particle), np.uint32)
-            slot_of[state.particle] = np.arange(len(slot_of))
-            self.rows["slot"][:] = slot_of[self._particle]
+            index_of = np.empty(len(state.particle), np.uint32)
+            index_of[state.particle] = np.arange(len(index_of))
+            self.rows["sorted_index"][:] = index_of[self._particle]
         return not same
 
     def _pack(self, pool: Pool, mass: Array) -> None:
@@ -100,7 +100,7 @@ class CoreLinks:
         order = [row for block in blocks for row in block]
         parts = [entries[row] for row in order]
         self._sources = {"": np.array(order, np.int64), "pin_": np.flatnonzero(whole & pins)}  # pool row of each row here
-        made = cuts | {"slot": np.zeros(len(self._particle), np.uint32)}
+        made = cuts | {"sorted_index": np.zeros(len(self._particle), np.uint32)}
         made["first"] = np.concatenate((np.zeros(1, np.int64), np.cumsum([len(each) for each in parts], dtype=np.int64)))
         made["node"] = np.array([node for each in parts for node in each], np.int64)
         made["pin_node"] = compact[pool.particle[pool.first[self._sources["pin_"]]]]
@@ -115,16 +115,16 @@ class CoreLinks:
 
     def end(self, links: Any) -> None:
         """After a successful frame: write the results of links to their pool."""
-        torn: list[tuple[int, float]] = []  # rows that broke, and their tension, N
+        broken_rows: list[tuple[int, float]] = []  # rows that broke, and their tension, N
         pool: Pool = links.pool
         for prefix, row in self._sources.items() if links and self.rows else ():
             mine: Any = self.rows
             if len(row) and unit("tools", np.float64).put_links(pool.rows, mine, prefix, REMEMBERED, row):
                 broken, pull = np.flatnonzero(mine[f"{prefix}intact"] == 0), mine[f"{prefix}pull"]
                 pulls = np.hypot(*pull[broken].T) if prefix else pull[broken]
-                torn += zip(row[broken].tolist(), pulls.tolist(), strict=True)
+                broken_rows += zip(row[broken].tolist(), pulls.tolist(), strict=True)
         pool.live = []
-        links.accept(torn)
+        links.accept(broken_rows)
 
 
 def _blocks(kinds: list[int], entries: dict[int, tuple[int, ...]]) -> list[tuple[Block, tuple[int, ...]]]:

@@ -7,7 +7,7 @@ from typing import Any
 
 from pyverlet.laws.gains import undriven
 from pyverlet.laws.integrators import PositionVerlet
-from pyverlet.laws.ledger import Page
+from pyverlet.laws.ledger import FrameLedger
 from pyverlet.laws.limiter import EnergyLimiter, holds
 from pyverlet.world.free_steps import OwnWalls, kicks
 from pyverlet.world.long_frames import parts_of
@@ -31,8 +31,8 @@ class FramePlan:
     """
 
     __slots__ = (
-        "alone", "before", "by_core", "dt", "gravity", "h", "half", "keeps_way", "ledger", "limited", "limiter", "may_limit",
-        "on_stage_end", "own_walls", "pieces", "substeps",
+        "before", "by_core", "dt", "gravity", "h", "half", "keeps_way", "ledger", "limited", "limiter", "may_limit",
+        "on_stage_end", "own_walls", "pieces", "substeps", "uninterrupted",
     )  # fmt: skip
 
     def __init__(self, world: Any, held: Any, dt: float, on_stage_end: Callable[[str], None]) -> None:
@@ -45,7 +45,7 @@ class FramePlan:
         self.half: float = integrator.velocity_lag if self.by_core else 0.5
         self.before: float = held.h if held.kick else 0.0
         self.own_walls = None if knows(world.boundary) else OwnWalls(world.boundary)
-        self.alone = self.by_core and not (forces or self.own_walls)
+        self.uninterrupted = self.by_core and not (forces or self.own_walls)
         same_count = held.steps in (0, self.substeps)
         self.keeps_way = isinstance(integrator, PositionVerlet) and self.before not in (0.0, self.h) and same_count
         # A method that raises the energy by itself (plain Verlet with a changing step) says nothing about contacts.
@@ -54,4 +54,4 @@ class FramePlan:
         self.may_limit = self.limited and (not (forces or world.links) or undriven(world))
         self.limiter = EnergyLimiter(world, dt) if self.may_limit and holds(world) else None
         self.on_stage_end = on_stage_end
-        self.ledger = on_stage_end if isinstance(on_stage_end, Page) else None
+        self.ledger = on_stage_end if isinstance(on_stage_end, FrameLedger) else None

@@ -10,18 +10,18 @@ from typing import Any
 
 import numpy as np
 
-from pyverlet.ground.arrays import Array
-from pyverlet.ground.constants import REST_ACCELERATIONS
-from pyverlet.ground.errors import NonFiniteError
+from pyverlet.common.arrays import Array
+from pyverlet.common.constants import REST_ACCELERATIONS
+from pyverlet.common.errors import NonFiniteError
 from pyverlet.laws.forces import Substep
 from pyverlet.laws.gains import gained_much, less_to_part, most_gained, undriven
 from pyverlet.laws.integrators import advance, solve_velocity
-from pyverlet.laws.ledger import Page
+from pyverlet.laws.ledger import FrameLedger
 from pyverlet.laws.limiter import EnergyLimiter
 from pyverlet.laws.obstacles import ObstacleArrays
 from pyverlet.world.contact_memory import Memory
-from pyverlet.world.contact_notes import notes_of_sleepers, sensed_by, told_of
 from pyverlet.world.core_arrays import CoreArrays
+from pyverlet.world.core_events import recorded_events, rows_of_sleepers, sensed_by
 from pyverlet.world.core_links import CoreLinks
 from pyverlet.world.frame_plan import FramePlan
 from pyverlet.world.free_steps import FreeSteps, OwnWalls, keep_way
@@ -65,24 +65,24 @@ class Frames:
     # ---- a frame -------------------------------------------------------------------------------------------------------------
 
     def step(self, world: Any, dt: float, on_stage_end: Callable[[str], None]) -> None:
-        """Advance the slots of a world by a frame of dt seconds; `World.step` then copies them back to the user's arrays.
+        """Advance the rows of a world by a frame of dt seconds; `World.step` then copies them back to the user's arrays.
 
         on_stage_end: called with the name of each stage; it may be the page of a ledger.
 
         Raises:
             NonFiniteError: a particle turned NaN or infinite.
         """
-        world._clear_notes()
+        world._clear_records()
         world._obstacle_arrays.begin()
         self.links.keep_apart(world, self.held.engine)
         if changed := world._gather():
             self.held.forget_list()
         if changed or world._state.let_go:
             self.held.h, world._state.let_go = 0.0, False
-        before = self.held.note(world._slots)
+        before = self.held.note(world._sorted)
         with np.errstate(over="ignore", invalid="ignore"):  # infinite values are reported as NonFiniteError
             senses = world._events and world._events.senses(world._obstacle_arrays)
-            if world._sleep and world._sleep.all_asleep(world._slots) and not senses:
+            if world._sleep and world._sleep.all_asleep(world._sorted) and not senses:
                 on_stage_end("gather")  # nothing moves, and contacts keep the impulses of when the last one fell asleep
                 on_stage_end("finish")
                 return
@@ -97,7 +97,7 @@ class Frames:
                         self.held.go_back(before)
             finally:
                 if not good:
-                    self.held.engine.note(False)
+                    self.held.engine.record_contacts(False)
 
     def end_plain(self, world: Any, plain: Any) -> None:
         """End a frame whose substeps the core has made by itself (a plain frame).
@@ -106,21 +106,21 @@ class Frames:
             NonFiniteError: a particle turned NaN or infinite.
         """
         with np.errstate(over="ignore", invalid="ignore"):
-            if world._slots.first_non_finite() >= 0:
-                particle, known, _, _, *numbers = self.held.note(world._slots)
+            if world._sorted.first_non_finite() >= 0:
+                particle, known, _, _, *numbers = self.held.note(world._sorted)
                 try:
                     self._refuse_non_finite(world, plain.dt)
                 finally:
                     self.held.go_back((particle, known, plain.given[:, :2], plain.given[:, 2], *numbers))
-                    self.held.engine.note(False)
+                    self.held.engine.record_contacts(False)
             if plain.limited:
                 self._limit(world, None, plain.dt)
 
     def run(self, world: Any, dt: float, on_stage_end: Callable[[str], None]) -> bool:
-        """Advance the gathered slots by a frame of dt seconds. False if a particle turned NaN or infinite."""
-        self.held.engine.note(False)  # the last frame's contacts are no longer needed
+        """Advance the gathered rows by a frame of dt seconds. False if a particle turned NaN or infinite."""
+        self.held.engine.record_contacts(False)  # the last frame's contacts are no longer needed
         self.held.load(world, dt)
-        world._slots.thread_team = self.held.engine.thread_team, self.held.parts  # it was replaced if there are more threads now
+        world._sorted.thread_team = self.held.engine.thread_team, self.held.parts  # it was replaced if there are more threads now
         frame = FramePlan(world, self.held, dt, on_stage_end)
         self._open(world, frame)
         on_stage_end("gather")
@@ -130,48 +130,48 @@ class Frames:
 
     def _open(self, world: Any, frame: FramePlan) -> None:
         """Prepare the first substep: springs, links and start velocities."""
-        state, dt = world._slots, frame.dt
+        state, dt = world._sorted, frame.dt
         state.h, state.own_walls = frame.h, frame.own_walls is not None
         self._time_step_check.look(world, frame.h)
 
         def moving() -> bool:
-            return moves(state, self._typical(world, alone=frame.alone), self.held.mean_radius)
+            return moves(state, self._typical(world, uninterrupted=frame.uninterrupted), self.held.mean_radius)
 
         follow(self.held, dt / (frame.substeps // frame.pieces), dt, frame.pieces, moving)
         self.links.load(world, self.held.engine, frame.substeps)
         if frame.keeps_way:
             keep_way(state, frame.before, frame.h)
         if getattr(world.integrator, "naive_start", False):
-            self._start_naively(world, (1.0 - frame.half) * frame.h)
+            self._naive_start(world, (1.0 - frame.half) * frame.h)
 
     def _attend(self, world: Any, frame: FramePlan) -> None:
         """Start recording what the ledger, contacts, events and sleep need from this frame."""
         engine = self.held.engine
         if frame.ledger:  # in a loaded world the core does not know yet whether contacts have friction
-            self._set_law(world, self._typical(world, alone=frame.alone), frame.h, frame.h)
+            self._set_law(world, self._typical(world, uninterrupted=frame.uninterrupted), frame.h, frame.h)
             frame.ledger.begin(engine, frame.half * frame.before / self.held.kick if self.held.kick else 0.0)
-        engine.note(world._touches is not None)
-        if world._touches is not None and world._touches.dt == np.inf:
-            world._touches.prepare(world._state.shown["number"])
+        engine.record_contacts(world._contact_records is not None)
+        if world._contact_records is not None and world._contact_records.dt == np.inf:
+            world._contact_records.prepare(world._state.shown["number"])
         if world._events is not None:
-            engine.listen(world._state.shown["number"])
+            engine.record_events(world._state.shown["number"])
         if world._sleep:
-            self._watch(world, frame.h, alone=frame.alone)
+            self._watch(world, frame.h, uninterrupted=frame.uninterrupted)
 
     def _substeps(self, world: Any, frame: FramePlan) -> bool:
         """Run all substeps, as many per call as possible. Returns False if a particle turned NaN or infinite."""
-        state, forces, engine, held = world._slots, world._force_sum, self.held.engine, self.held
-        h, half, by_core, alone, ledger = frame.h, frame.half, frame.by_core, frame.alone, frame.ledger
-        step, finite, met, before, self.repeats = 0, True, not alone, frame.before, False
+        state, forces, engine, held = world._sorted, world._force_sum, self.held.engine, self.held
+        h, half, by_core, uninterrupted, ledger = frame.h, frame.half, frame.by_core, frame.uninterrupted, frame.ledger
+        step, finite, met, before, self.repeats = 0, True, not uninterrupted, frame.before, False
         while step < frame.substeps:
             opens, known = step == 0 or not by_core, held.kick > 0.0  # opens: velocities belong to the positions
             if met and world._sleep and world._sleep.anyone:
-                self._wake_met(world, step, h, alone=alone)
+                self._wake_met(world, step, h, uninterrupted=uninterrupted)
             kick = half * (h + before) if half and opens else h
             opening = 0.0 if not by_core else half * h if half and opens else h
             if not by_core:
                 self._flight.take(world.integrator, state, forces, world.time + step * h, h)
-            elif not alone:
+            elif not uninterrupted:
                 self._evaluate(world, step * h, half * h if step else 0.0)
                 if opening != h:
                     # Same rounding as methods that store u: back by half a substep, on by a whole one: x' = 2 x - x_prev + a h^2.
@@ -179,25 +179,25 @@ class Frames:
                     opening = h
             frame.on_stage_end("integrate")
             # A first substep with a kick of its own, or an observer between substeps, needs a call for each.
-            stop = step + 1 if not alone or world.onlooker or kick != h else frame.substeps
+            stop = step + 1 if not uninterrupted or world.observer or kick != h else frame.substeps
             last = stop == frame.substeps
-            self._set_law(world, self._typical(world, alone=alone), h, kick)
+            self._set_law(world, self._typical(world, uninterrupted=uninterrupted), h, kick)
             engine.set_frame(
                 opening,
                 half * before / held.kick if opens and known else 0.0,
                 kick / held.kick if known else 1.0,
                 half * h if last else 0.0,
                 1.0 / (kick if stop == step + 1 else h) if last else 0.0,
-                alone,
+                uninterrupted,
                 *world.gravity,
                 h / kick,
-                None if alone else state.strength,
+                None if uninterrupted else state.strength,
             )
             reached, finite = engine.run(step, stop, held.parts)
-            met = not alone or reached < stop
+            met = not uninterrupted or reached < stop
             if reached == step:
                 continue
-            self.repeats = alone and known and kick == before == h == held.kick and reached - step == frame.substeps
+            self.repeats = uninterrupted and known and kick == before == h == held.kick and reached - step == frame.substeps
             held.kick, before, step = kick if reached == step + 1 else h, h, reached
             frame.on_stage_end("contacts")
             lag = half * h if by_core else 0.0
@@ -209,62 +209,62 @@ class Frames:
                 ledger.moved(lag, held.gave, held.kick)
             if forces.forces and self._end_substep(world, step - 1, h, lag, ledger) and ledger:
                 ledger.moved(lag, held.gave, held.kick, leaps=True)
-            world._show(step * h, lag) if world.onlooker and step < frame.substeps else None
+            world._show(step * h, lag) if world.observer and step < frame.substeps else None
         return bool(finite)
 
     def _close(self, world: Any, frame: FramePlan, *, finite: bool) -> bool:
         """Bring velocities to the time of the positions and report to listeners. False if a particle turned NaN or infinite."""
-        state, engine, held, h, half, dt = world._slots, self.held.engine, self.held, frame.h, frame.half, frame.dt
+        state, engine, held, h, half, dt = world._sorted, self.held.engine, self.held, frame.h, frame.half, frame.dt
         forces = world._force_sum
         held.h, held.steps, held.typical, held.strongest = h, frame.substeps, forces.typical, forces.strongest
         self.repeats &= frame.pieces == 1 and held.hertz == STIFFNESS / h and not held.finer
-        if not frame.alone:
+        if not frame.uninterrupted:
             self._end(world, dt, half * h if frame.by_core else 0.0, frame.own_walls, frame.ledger)
         engine.show_links(half * h, held.kick)
-        if (not finite or not frame.alone) and state.first_non_finite() >= 0:
+        if (not finite or not frame.uninterrupted) and state.first_non_finite() >= 0:
             return False
         if frame.ledger:
             frame.ledger.end(half * h / held.kick)
         if frame.limited and frame.gravity == world.gravity:
             self._limit(world, frame.limiter, dt, may_limit=frame.may_limit)
-        if world._touches is not None:
-            world._touches.dt = dt
+        if world._contact_records is not None:
+            world._contact_records.dt = dt
             if world._sleep:  # the core does not know the contacts of particles that fall asleep now
-                world._take_contacts(notes_of_sleepers(held.asleep, world._state.shown["mass"].astype(float), dt))
+                world._take_contacts(rows_of_sleepers(held.asleep, world._state.shown["mass"].astype(float), dt))
         if world._events is not None:
-            world._events.hear(told_of(engine, world._obstacle_arrays))
+            world._events.record(recorded_events(engine, world._obstacle_arrays))
             world._events.sense(world._obstacle_arrays, *sensed_by(engine, world))
-            engine.listen(None)
+            engine.record_events(None)
         strength, shown = float(np.hypot(*frame.gravity)), world._state.shown
         if world._sleep and world._sleep.end(state, shown["position"], self.listed(), dt, strength):
             held.set_aside(state)
         frame.on_stage_end("finish")
-        if state.seam:
-            engine.wrap_seam(state.crossed)
+        if state.periodic:
+            engine.wrap_positions(state.crossed)
         return True
 
     @staticmethod
-    def _end_substep(world: Any, step: int, h: float, lag: float, page: Page | None) -> float:
+    def _end_substep(world: Any, step: int, h: float, lag: float, ledger: FrameLedger | None) -> float:
         """Call forces that act once per substep, such as heat baths; returns the energy that they have added, J."""
         given = 0.0
         for force in world.forces[:]:
             if act := getattr(force, "end_substep", None):
                 at = Substep(world._state.births, world.frames, step, h, lag)
-                given += (joules := act(world._slots, at))
-                if page:
-                    page.gained(getattr(force, "account", "forces"), joules)
+                given += (joules := act(world._sorted, at))
+                if ledger:
+                    ledger.gained(getattr(force, "account", "forces"), joules)
         return given
 
-    def _watch(self, world: Any, h: float, *, alone: bool) -> None:
+    def _watch(self, world: Any, h: float, *, uninterrupted: bool) -> None:
         """Have the core look for contacts with sleepers in substeps of h seconds."""
-        strongest = self._strongest(world.gravity) if alone else world._force_sum.strongest
+        strongest = self._strongest(world.gravity) if uninterrupted else world._force_sum.strongest
         nearer = REST_ACCELERATIONS * strongest * h * h
-        self.held.engine.watch(world._slots.island if world._sleep.anyone else None, nearer)
+        self.held.engine.watch(world._sorted.island if world._sleep.anyone else None, nearer)
 
-    def _wake_met(self, world: Any, step: int, h: float, *, alone: bool) -> None:
+    def _wake_met(self, world: Any, step: int, h: float, *, uninterrupted: bool) -> None:
         """Wake islands that are touched in the coming substep, and those that they may then be thrown at."""
-        state, typical = world._slots, self._typical(world, alone=alone)
-        self._watch(world, h, alone=alone)
+        state, typical = world._sorted, self._typical(world, uninterrupted=uninterrupted)
+        self._watch(world, h, uninterrupted=uninterrupted)
         self._set_law(world, typical, h, h)
         while (met := self.held.engine.find_met(step, self.held.parts)) is not None:
             if world._events:
@@ -274,9 +274,9 @@ class Frames:
             self.held.hertz = min(self.held.hertz, STIFFEST / h)
             self._set_law(world, typical, h, h)
 
-    def _typical(self, world: Any, *, alone: bool) -> float:
-        """The mean acceleration of free particles, m/s^2; alone: by gravity alone."""
-        return self._strongest(world.gravity) if alone else float(world._force_sum.typical)
+    def _typical(self, world: Any, *, uninterrupted: bool) -> float:
+        """The mean acceleration of free particles, m/s^2; uninterrupted: by gravity alone."""
+        return self._strongest(world.gravity) if uninterrupted else float(world._force_sum.typical)
 
     def _strongest(self, gravity: tuple[float, float]) -> float:
         """The largest acceleration by gravity alone, m/s^2."""
@@ -290,13 +290,13 @@ class Frames:
         if limiter is None and may_limit and gained_much(world) and undriven(world):
             limiter = EnergyLimiter(world, dt)
         if limiter is not None:
-            limiter.limit(world._slots, self.listed)
+            limiter.limit(world._sorted, self.listed)
         if self.held.parting:
             self.held.parting = less_to_part(self.held.parting, dt, most_gained(world))
 
     def _refuse_non_finite(self, world: Any, dt: float) -> None:
         """Repeat a failed frame from the last good state and check each stage; normal frames pay nothing for this."""
-        state = world._slots
+        state = world._sorted
         last = state.first_non_finite()
 
         def look(stage: str) -> None:
@@ -309,9 +309,9 @@ class Frames:
         self.run(world, dt, look)
         raise NonFiniteError(last, "contacts", world.time)
 
-    def _start_naively(self, world: Any, missing: float) -> None:
+    def _naive_start(self, world: Any, missing: float) -> None:
         """Kick new particles by what x_prev = x - v h leaves out, since their first kick is taken to be a whole one."""
-        state = world._slots
+        state = world._sorted
         fresh = np.isnan(state.acceleration[:, 0])
         if fresh.any():
             self._evaluate(world, 0.0, 0.0)
@@ -322,7 +322,7 @@ class Frames:
 
         These velocities depend on the accelerations: for user-defined forces they are solved for.
         """
-        state, forces = world._slots, world._force_sum
+        state, forces = world._sorted, world._force_sum
         if not (ahead and forces.velocity_dependent):
             forces(state, world.time + since)
             return
@@ -338,16 +338,16 @@ class Frames:
         finally:
             state.velocity = velocity
 
-    def _end(self, world: Any, dt: float, half: float, own_walls: OwnWalls | None, page: Page | None) -> None:
+    def _end(self, world: Any, dt: float, half: float, own_walls: OwnWalls | None, ledger: FrameLedger | None) -> None:
         """Bring velocities to the time of the positions; accelerations then include those by contacts."""
-        state = world._slots
+        state = world._sorted
         if half:
             self._evaluate(world, dt, half)
             velocity, given = state.velocity, (self.held.gave, half / self.held.kick)
             state.motion.advance_by_two(velocity, velocity, state.acceleration, half, *given)
             state.spin += self.held.gave_spin * state.real(half / self.held.kick)
             if own_walls:
-                own_walls.go_on(state, page, half / self.held.kick)
+                own_walls.go_on(state, ledger, half / self.held.kick)
         advance(state.acceleration, state.acceleration, self.held.gave, 1.0 / self.held.kick)
 
     def _set_law(self, world: Any, strongest: float, h: float, kick: float) -> None:
@@ -389,6 +389,6 @@ class Frames:
         return int(self.held.engine.rebuilds())
 
     def listed(self) -> tuple[Array, Array, Array, Array]:
-        """first, count, i, j: the ranges of the pair list, by slot. Some pairs occur twice."""
+        """first, count, i, j: the ranges of the pair list, by row. Some pairs occur twice."""
         pairs: tuple[Array, Array, Array, Array] = self.held.engine.pairs()
         return pairs

@@ -13,9 +13,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from pyverlet.ground.constants import REST_ACCELERATIONS
+from pyverlet.common.constants import REST_ACCELERATIONS
 from pyverlet.laws.integrators import Forces, Integrator, PositionVerlet, SemiImplicitEuler
-from pyverlet.state.slots import Slots
+from pyverlet.state.sorted_state import SortedState
 
 
 def kicks(integrator: Integrator) -> bool:
@@ -23,7 +23,7 @@ def kicks(integrator: Integrator) -> bool:
     return type(integrator).step in (PositionVerlet.step, SemiImplicitEuler.step)
 
 
-def keep_way(state: Slots, before: float, h: float) -> None:
+def keep_way(state: SortedState, before: float, h: float) -> None:
     """Keep x - x_prev when the step length changes, and add a h^2: the error of plain Verlet, shown on purpose."""
     known = ~np.isnan(state.acceleration[:, 0])
     a, half, more = state.acceleration[known], state.real(0.5 * before), state.real(before / h - 1.0)
@@ -36,7 +36,7 @@ class FreeSteps:
     def __init__(self) -> None:
         self._left = self._particle = np.empty(0)
 
-    def take(self, integrator: Integrator, state: Slots, forces: Forces, t: float, h: float) -> None:
+    def take(self, integrator: Integrator, state: SortedState, forces: Forces, t: float, h: float) -> None:
         """Replace velocities and accelerations by their means over the substep from t on; positions stay."""
         position, before, acceleration = state.position.copy(), state.velocity.copy(), state.acceleration
         integrator.full_step(state, forces, t, h)
@@ -45,9 +45,9 @@ class FreeSteps:
         self._left, self._particle = np.empty_like(before), state.particle
         state.motion.mean_of_step(state.position, state.velocity, state.acceleration, position, before, h, self._left)
 
-    def end(self, state: Slots, given: NDArray[Any], given_spin: NDArray[Any], share: float) -> None:
+    def end(self, state: SortedState, given: NDArray[Any], given_spin: NDArray[Any], share: float) -> None:
         """Set velocities at the end of the substep, in which contacts gave `share` times these, as if evenly over time."""
-        if self._particle is not state.particle:  # a new pair list has re-sorted the slots
+        if self._particle is not state.particle:  # a new pair list has re-sorted the rows
             by_particle = np.empty_like(self._left)
             by_particle[self._particle] = self._left
             self._left = by_particle[state.particle]
@@ -64,31 +64,31 @@ class OwnWalls:
             until the frame ends: half of it is then still to be added.
     """
 
-    def __init__(self, room: Any) -> None:
-        self._room = room
+    def __init__(self, boundary: Any) -> None:
+        self._boundary = boundary
         self.gave: NDArray[Any]
         self.gave_spin: NDArray[Any]
 
-    def confine(self, state: Slots, page: Any, h: float, lag: float, strongest: float) -> None:
-        """Confine particles after a substep of h seconds; velocities are `lag` s old; page: of a ledger, or None."""
+    def confine(self, state: SortedState, ledger: Any, h: float, lag: float, strongest: float) -> None:
+        """Confine particles after a substep of h seconds; velocities are `lag` s old; ledger: that of the frame, or None."""
         velocity, spin, about = state.velocity.copy(), state.spin.copy(), (h, lag, REST_ACCELERATIONS * strongest * h)
-        if page:
-            page.confined(self._room.confine, *about)
+        if ledger:
+            ledger.confined(self._boundary.confine, *about)
         else:
-            self._room.confine(state, *about)
+            self._boundary.confine(state, *about)
         self.gave, self.gave_spin = state.velocity - velocity, state.spin - spin
         others = np.hypot(*self.gave.T) > about[2]
-        others |= self._room.facing(state.position[:1]) is None
+        others |= self._boundary.facing(state.position[:1]) is None
         self.gave[others] = self.gave_spin[others] = 0
 
-    def go_on(self, state: Slots, page: Any, part: float) -> None:
+    def go_on(self, state: SortedState, ledger: Any, part: float) -> None:
         """At the end of the frame: add `part` of what the walls gave in the last substep."""
 
-        def give(state: Slots, part: float, lag: float) -> None:
+        def give(state: SortedState, part: float, lag: float) -> None:
             state.velocity += state.real(part) * self.gave
             state.spin += state.real(part) * self.gave_spin
 
-        if page:
-            page.confined(give, part, 0.0)
+        if ledger:
+            ledger.confined(give, part, 0.0)
         else:
             give(state, part, 0.0)

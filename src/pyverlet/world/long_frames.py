@@ -7,9 +7,9 @@ from typing import Any
 
 import numpy as np
 
-from pyverlet.ground.constants import MOST_SUBSTEPS
-from pyverlet.ground.errors import InputError
-from pyverlet.laws.rooms import Open
+from pyverlet.common.constants import MOST_SUBSTEPS
+from pyverlet.common.errors import InputError
+from pyverlet.laws.boundaries import Open
 from pyverlet.world.materials import knows
 
 LONGEST = 1 / 30
@@ -33,12 +33,12 @@ def parts_of(world: Any, dt: float) -> int:
     Raises:
         InputError: too many to wait for.
     """
-    room, meet, substeps = world.boundary, world.collisions and len(world) > 1, world.substeps
-    borne = substeps * world._force_sum.longest_substep(world._slots)
+    boundary, meet, substeps = world.boundary, world.collisions and len(world) > 1, world.substeps
+    borne = substeps * world._force_sum.longest_substep(world._sorted)
     parts = np.ceil(dt / borne * (1 - 1e-9)) if dt > borne else 1.0
     longest = LONGEST * max(1.0, substeps / 8)
     # Without collisions, rooms with a confining method of their own are shown with long frames, as the method handles them.
-    holds = world.obstacles or world.links or (not isinstance(room, Open) and (world.collisions or knows(room)))
+    holds = world.obstacles or world.links or (not isinstance(boundary, Open) and (world.collisions or knows(boundary)))
     if dt > longest and (meet or holds):
         parts = max(parts, np.ceil(dt / max(longest, _borne(world, dt / parts)) * (1 - 1e-9)))
     if parts * substeps > MOST_SUBSTEPS:
@@ -52,7 +52,7 @@ def parts_of(world: Any, dt: float) -> int:
 
 def _borne(world: Any, dt: float) -> float:
     """The longest frame that contacts bear, s."""
-    state, forces = world._slots, world._force_sum
+    state, forces = world._sorted, world._force_sum
     if world.links or world._obstacle_arrays.drives or not len(state):
         return 0.0  # links and obstacles may be faster than any particle
     state.h = dt / world.substeps  # drag needs it

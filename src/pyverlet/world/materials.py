@@ -6,15 +6,15 @@ from typing import Any
 
 import numpy as np
 
-from pyverlet.ground.arrays import Array
-from pyverlet.ground.errors import InputError
+from pyverlet.common.arrays import Array
+from pyverlet.common.errors import InputError
+from pyverlet.laws.boundaries import Box, Circle, Open, Periodic
 from pyverlet.laws.collisions import COMBINE, BruteForce, Collisions
-from pyverlet.laws.rooms import Box, Circle, Open, Periodic
-from pyverlet.state.slots import Slots
+from pyverlet.state.sorted_state import SortedState
 
-ROOMS = Open, Circle, Box, Periodic
+BOUNDARIES = Open, Circle, Box, Periodic
 
-_KNOWN = tuple(room.confine for room in ROOMS)
+_KNOWN = tuple(boundary.confine for boundary in BOUNDARIES)
 
 OPEN, CAGE, BOX = range(3)
 """Numbers of the kinds of rooms in the core."""
@@ -29,7 +29,7 @@ ALL = 1e12
 """Mean diameters: beyond it positions of either precision have no meaning."""
 
 
-def ease_of(state: Slots) -> Array:
+def ease_of(state: SortedState) -> Array:
     """(n,) m r^2 over the moment of inertia: 2 for discs and pinned particles, 0 for fixed rotation."""
     if not (state.own_inertia or len(state.fixed_rotation)):
         return np.broadcast_to(state.real(2), len(state))
@@ -40,7 +40,7 @@ def ease_of(state: Slots) -> Array:
     return ease
 
 
-def mixed(state: Slots) -> bool:
+def mixed(state: SortedState) -> bool:
     """Whether circles differ in material or size."""
     own = ("radius", "restitution", "friction", "rolling_resistance")
     return bool(len(state.material) or len(state.fixed_rotation) or state.own_inertia) or any(map(state.differ, own))
@@ -51,7 +51,7 @@ def names_of(collisions: Collisions | None) -> list[str]:
     return ["", *collisions.names] if collisions and collisions.materials else []
 
 
-def numbers_of(state: Slots, names: list[str]) -> Array:
+def numbers_of(state: SortedState, names: list[str]) -> Array:
     """(n,) the number of each circle's material in `names`, 0 for none.
 
     Raises:
@@ -77,7 +77,7 @@ def number_of(material: str, names: list[str], whose: str) -> int:
     return names.index(material) if names else 0
 
 
-def materials_of(state: Slots, radius: Array, collisions: Collisions | None) -> dict[str, Any]:
+def materials_of(state: SortedState, radius: Array, collisions: Collisions | None) -> dict[str, Any]:
     """The arguments of `Engine.set_materials`; radius: (n,) m, in the user's order, on which the last bit of a mean depends."""
     radius = radius if state.differ("radius") else radius[:1]
     ordered = np.sort(radius) if len(radius) else np.ones(1)
@@ -101,13 +101,13 @@ def materials_of(state: Slots, radius: Array, collisions: Collisions | None) -> 
         "restitution": collisions.restitution if collisions else 0.0,
         "friction": collisions.friction if collisions else 0.0,
         "rolling": collisions.rolling_resistance if collisions else 0.0,
-        "picky": bool(len(state.category)) or not bool((state.inverse_mass > 0).all()),
+        "tests_pairs": bool(len(state.category)) or not bool((state.inverse_mass > 0).all()),
     }
 
 
-def resist(room: Any, name: str, *most: float) -> bool:
+def resist(boundary: Any, name: str, *most: float) -> bool:
     """Whether any contact has friction, or the property called `name`; most: largest values of pairs, circles and obstacles."""
-    return max(getattr(room, name, 0.0), *most) > 0.0
+    return max(getattr(boundary, name, 0.0), *most) > 0.0
 
 
 def skin_of(collisions: Collisions | None) -> float | None:
@@ -122,18 +122,18 @@ def _differs(column: Array) -> bool:
     return bool(len(column) and (column != column[0]).any())
 
 
-def knows(room: Any) -> bool:
+def knows(boundary: Any) -> bool:
     """Whether the core knows the walls of a room; user-defined rooms confine the particles after each substep."""
-    return type(room).confine in _KNOWN
+    return type(boundary).confine in _KNOWN
 
 
-def walls_of(room: Any, names: list[str]) -> tuple[float, ...]:
-    """The arguments of `Engine.set_room`; names: of materials."""
-    if not knows(room) or not isinstance(room, (Circle, Box, Periodic)):
+def walls_of(boundary: Any, names: list[str]) -> tuple[float, ...]:
+    """The arguments of `Engine.set_boundary`; names: of materials."""
+    if not knows(boundary) or not isinstance(boundary, (Circle, Box, Periodic)):
         return _NO_WALLS
-    material = number_of(room.material, names, "the room")
-    about = room.restitution, room.friction, room.rolling_resistance
-    marks = material, room.category, room.mask
-    if isinstance(room, Circle):
-        return CAGE, *room.center, room.radius, 0.0, *about, room.angular_velocity * room.radius, *marks
-    return _NO_WALLS if isinstance(room, Periodic) and room.axes == "xy" else (BOX, *room._box, *about, 0.0, *marks)
+    material = number_of(boundary.material, names, "the room")
+    about = boundary.restitution, boundary.friction, boundary.rolling_resistance
+    marks = material, boundary.category, boundary.mask
+    if isinstance(boundary, Circle):
+        return CAGE, *boundary.center, boundary.radius, 0.0, *about, boundary.angular_velocity * boundary.radius, *marks
+    return _NO_WALLS if isinstance(boundary, Periodic) and boundary.axes == "xy" else (BOX, *boundary._box, *about, 0.0, *marks)

@@ -9,19 +9,20 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from pyverlet.common.arrays import Array
+from pyverlet.common.errors import InputError
+from pyverlet.common.renamed import Renamed
+from pyverlet.common.shown import line
+from pyverlet.common.step_lock import between_frames
 from pyverlet.core import unit
-from pyverlet.ground.arrays import Array
-from pyverlet.ground.errors import InputError
-from pyverlet.ground.shown import line
-from pyverlet.ground.step_lock import of_one_frame
+from pyverlet.laws.boundaries import Boundary
 from pyverlet.laws.collisions import Overlap, measure_overlap
+from pyverlet.laws.contact_records import WALLS, ContactRecords
 from pyverlet.laws.events import Events
 from pyverlet.laws.forces import ForceSum, has_potential
 from pyverlet.laws.integrators import Integrator
 from pyverlet.laws.ledger import EnergyLedger, Ledger
 from pyverlet.laws.obstacles import Obstacle
-from pyverlet.laws.rooms import Boundary
-from pyverlet.laws.touches import WALLS, Touches
 from pyverlet.state.state import spin_radius
 from pyverlet.world.particles import Particles
 
@@ -62,7 +63,7 @@ class Measures(Particles):
     profile: Any
     threads: int
 
-    @of_one_frame
+    @between_frames
     def energy(self) -> Energy:
         """Kinetic (motion and spin), potential, links and total energy, J."""
         s, links = self._state, self.links.energy() if self.links else 0.0
@@ -78,7 +79,7 @@ class Measures(Particles):
         return self._energy_ledger is not None
 
     @property
-    @of_one_frame
+    @between_frames
     def ledger(self) -> Ledger:
         """Energy accounts since the world was built, as of the last frame.
 
@@ -90,20 +91,20 @@ class Measures(Particles):
         return self._energy_ledger.ledger
 
     @property
-    @of_one_frame
+    @between_frames
     def asleep(self) -> Array:
         """(n,) bool, which particles sleep; none unless the world was built with World(sleep=True). A copy."""
         asleep = np.zeros(len(self), bool)
-        asleep[self._slots.particle[self._slots.asleep]] = True
+        asleep[self._sorted.particle[self._sorted.asleep]] = True
         return asleep
 
     @property
-    def tells_events(self) -> bool:
+    def records_events(self) -> bool:
         """Whether the world was built with World(events=True), so that `events` can be read."""
         return self._events is not None
 
     @property
-    @of_one_frame
+    @between_frames
     def events(self) -> Events:
         """Contacts that began or ended in the last frame, and hits.
 
@@ -117,7 +118,7 @@ class Measures(Particles):
     # ---- who touches -----------------------------------------------------------------------------------------------------
 
     @property
-    @of_one_frame
+    @between_frames
     def contacts(self) -> Array:
         """Contacts of the last frame, a structured array sorted by `a`, then `b`; impacts that have ended are included.
 
@@ -128,9 +129,9 @@ class Measures(Particles):
         Raises:
             InputError: the world records no contacts.
         """
-        return self._noting().records
+        return self._recorded().records
 
-    @of_one_frame
+    @between_frames
     def force_on(self, what: Obstacle | Boundary) -> Array:
         """(2,) N, the force of all circles on an obstacle or on all walls of the room, averaged over the last frame.
 
@@ -139,15 +140,15 @@ class Measures(Particles):
         Raises:
             InputError: it is not in this world, or the world records no contacts.
         """
-        touches, which = self._noting(), WALLS
+        records, which = self._recorded(), WALLS
         if what is not self.boundary:
             number = self._obstacle_arrays.number_of(what)
             if number is None:
                 raise InputError(f"what is {what!r}; allowed is an obstacle of this world, or its boundary")
             which = self._frames.held.obstacles.number_then(what, number)
-        return touches.force_on(which)
+        return records.force_on(which)
 
-    @of_one_frame
+    @between_frames
     def pressure(self) -> float:
         """Pressure on the walls of the room in the last frame, N/m: the normal force of circles over the length of the walls.
 
@@ -158,10 +159,10 @@ class Measures(Particles):
         Raises:
             InputError: the room has neither walls of a known length nor periods, or the world records no contacts.
         """
-        touches, length = self._noting(), self.boundary.perimeter()
+        records, length = self._recorded(), self.boundary.perimeter()
         if length is not None:
-            return touches.pushed() / length
-        if not self.boundary.seam:
+            return records.pushed() / length
+        if not self.boundary.periodic:
             allowed = "a pyverlet.Box, Circle or Periodic"
             raise InputError(f"boundary is {self.boundary!r}; allowed is {allowed}, to have a pressure")
         free = np.isfinite(self.mass)
@@ -169,25 +170,28 @@ class Measures(Particles):
         stream = mass @ velocity / max(mass.sum(), 1e-300)
         motion = float((mass[:, None] * (velocity - stream) ** 2).sum())
         pairs: float = sum(force.virial(self._state) for force in self.forces if hasattr(force, "virial"))
-        return (motion + touches.virial() + pairs) / (2 * self.boundary.seam.period_x * self.boundary.seam.period_y)
+        return (motion + records.virial() + pairs) / (2 * self.boundary.periodic.period_x * self.boundary.periodic.period_y)
 
-    def _noting(self) -> Touches:
-        touches = self._touches
-        if touches is None:
+    def _recorded(self) -> ContactRecords:
+        records = self._contact_records
+        if records is None:
             raise InputError("contacts are off in this world; allowed is a world built with World(contacts=True)")
-        touches.take(self._state.shown["number"], self._frames.held.obstacles.count)
-        return touches
+        records.take(self._state.shown["number"], self._frames.held.obstacles.count)
+        return records
 
     @contextmanager
-    def noting_contacts(self) -> Iterator[Touches]:
+    def recording_contacts(self) -> Iterator[ContactRecords]:
         """Context manager: frames record contacts as with World(contacts=True); yields the record."""
-        before = self._touches
-        self._touches = Touches(self._frames.held.engine) if before is None else before
+        before = self._contact_records
+        self._contact_records = ContactRecords(self._frames.held.engine) if before is None else before
         try:
-            yield self._touches
+            yield self._contact_records
             self._take_contacts()
         finally:
-            self._touches = before
+            self._contact_records = before
+
+    noting_contacts: Any = Renamed("recording_contacts")
+    tells_events: Any = Renamed("records_events")
 
     def momentum(self) -> Array:
         """(2,) sum of m v over all free particles, kg m/s."""
@@ -197,7 +201,7 @@ class Measures(Particles):
         """Sum of m (x v_y - y v_x) + I spin about the origin, kg m^2/s."""
         return float(self._momenta()[2])
 
-    @of_one_frame
+    @between_frames
     def _momenta(self) -> tuple[float, float, float]:
         found: tuple[float, float, float] = unit("engine", self._state.dtype).momenta(*self._bodies())
         return found
@@ -207,18 +211,18 @@ class Measures(Particles):
         s = self._state.shown
         return s["position"], s["velocity"], s["spin"], spin_radius(s["inertia"], s["radius"], s["mass"]), s["mass"]
 
-    @of_one_frame
+    @between_frames
     def overlap(self) -> Overlap:
         """Mean and largest overlap of touching pairs, as fractions of their contact distance, and the number of pairs."""
         return measure_overlap(self._state, self.links.known_apart())
 
-    @of_one_frame
+    @between_frames
     def escaped(self) -> int:
         """Number of particles whose centre is outside the boundary, without those that its walls do not hold."""
         held = self.boundary.holds(self.category, self.mask)
         return int(np.count_nonzero(self.boundary.outside(self.position) & held))
 
-    @of_one_frame
+    @between_frames
     def state_hash(self) -> str:
         """16 hex digits of time and every particle's position, velocity, spin, angle, radius and mass: equal bits, equal hash."""
         return hash_of(self.time, (self.position, self.velocity, self.spin, self.angle, self.radius, self.mass))

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from pyverlet.ground.arrays import Array
+from pyverlet.common.arrays import Array
 from pyverlet.laws.obstacles import Obstacle, ObstacleArrays, journal
 from pyverlet.laws.obstacles import rows as at
 from pyverlet.laws.obstacles._grid import cells_for, check_distance
@@ -50,7 +50,7 @@ class ObstacleRows:
         Returns the new number of each previous surface, or -1; None if numbers are unchanged.
         """
         arrays.begin()
-        self.refiltered, seen = None, (arrays.version, (arrays.seam, engine, names))
+        self.refiltered, seen = None, (arrays.version, (arrays.periodic, engine, names))
         if seen == self._seen:
             if len(self._moving) and not engine.place_obstacles(self._moving, dt, False):
                 self._build(engine, len(arrays.seen), radius, dt)
@@ -167,7 +167,7 @@ _Names = tuple[list[Obstacle], Array, int]
 
 def _named(arrays: ObstacleArrays) -> _Names:
     """The obstacles, the first segment of each, and the number of periodic images of all."""
-    return arrays.seen, arrays.first, len(arrays.seam.images())
+    return arrays.seen, arrays.first, len(arrays.periodic.images())
 
 
 def _renamed(before: _Names, after: _Names, places: Array | None = None) -> Array:

@@ -5,8 +5,8 @@ from __future__ import annotations
 import hashlib
 from collections.abc import Callable, Iterator, Sequence
 
-from pyverlet.ground.errors import InputError
-from pyverlet.ground.shown import Shown, listed
+from pyverlet.common.errors import InputError
+from pyverlet.common.shown import Shown, listed
 from pyverlet.world.saved import Saved
 from pyverlet.world.world import World
 

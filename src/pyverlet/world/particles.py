@@ -10,22 +10,22 @@ from typing import Any, Literal, get_args
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from pyverlet.ground import checks
-from pyverlet.ground.arrays import Array
-from pyverlet.ground.errors import InputError
-from pyverlet.ground.guess import did_you_mean
-from pyverlet.ground.lists import Contents
-from pyverlet.ground.step_lock import Shared, in_turn, of_one_frame
+from pyverlet.common import checks
+from pyverlet.common.arrays import Array
+from pyverlet.common.errors import InputError
+from pyverlet.common.guess import did_you_mean
+from pyverlet.common.lists import Contents
+from pyverlet.common.step_lock import Shared, between_frames, exclusive
+from pyverlet.laws.boundaries import Boundary
 from pyverlet.laws.collisions import Collisions
+from pyverlet.laws.contact_records import ContactRecords
 from pyverlet.laws.events import Events
 from pyverlet.laws.forces import ForceList, Numbered
 from pyverlet.laws.links import Links
 from pyverlet.laws.obstacles import ObstacleArrays, Obstacles
-from pyverlet.laws.rooms import Boundary
-from pyverlet.laws.touches import Touches
 from pyverlet.state.data import known, rows
 from pyverlet.state.group import Columns, Group, Particle, check_home
-from pyverlet.state.slots import Slots
+from pyverlet.state.sorted_state import SortedState
 from pyverlet.state.state import EVERYONE, check_set
 from pyverlet.world.actors import Actors, Sink
 from pyverlet.world.queries import free_in_order, on_others
@@ -41,10 +41,10 @@ _ALLOWED = "free places, and all with on_overlap='push'"
 class Particles(Columns, Shared):
     """The particles of a world. Its arrays are views, in the order the particles were added."""
 
-    _slots: Slots
+    _sorted: SortedState
     _frames: Any
     _events: Events | None
-    _touches: Touches | None
+    _contact_records: ContactRecords | None
     forces = Contents[ForceList]()
     links = Contents[Links]()
     _where, _whole = slice(None), True
@@ -56,18 +56,18 @@ class Particles(Columns, Shared):
 
     def held(self) -> AbstractContextManager[None]:
         """Context manager: no other thread steps or changes the world inside `with world.held():`, so reads see one frame."""
-        return self._state.turn.held()
+        return self._state.lock.held()
 
     def held_by(self, page: Callable[[], AbstractContextManager[None]] | None) -> None:
         """Register the page that steps this world; `page()` is a context in which it pauses between frames. None: unregister."""
-        self._state.turn.page = page
+        self._state.lock.page = page
 
     @property
     def has_page(self) -> bool:
         """Whether a page steps this world while the program runs."""
-        return self._state.turn.page is not None
+        return self._state.lock.page is not None
 
-    @in_turn
+    @exclusive
     def add(
         self,
         *,
@@ -170,7 +170,7 @@ class Particles(Columns, Shared):
         where = values["position"]
         held, kept = self._places(where, *(values[name] for name in _MET), allowed=None if on_overlap == "skip" else _ALLOWED)
         values["position"] = np.where(held[:, None], self.boundary.put_in(where, values["radius"]), where)
-        values["crossed"] = self._state.seam.periods(where.astype(np.float64) - values["position"])
+        values["crossed"] = self._state.periodic.periods(where.astype(np.float64) - values["position"])
         if on_overlap is None or self.collisions is None:
             return kept
         pairs = on_others(self._state, values)
@@ -211,7 +211,7 @@ class Particles(Columns, Shared):
             raise InputError(f"position[{k}] is ({x:g}, {y:g}) m, {what}; allowed are {allowed}")
         return held, good
 
-    @in_turn
+    @exclusive
     def remove(self, which: Group | Particle | ArrayLike) -> None:
         """Remove particles. Groups keep the remaining ones; indices are renumbered without gaps.
 
@@ -231,11 +231,11 @@ class Particles(Columns, Shared):
         if not len(gone):
             return
         self._take_contacts()
-        now = self._state.remove(gone, self._slots.alike_in(self._state))
+        now = self._state.remove(gone, self._sorted.alike_in(self._state))
         self._renumber(now)
-        self._frames.renumber(now, self._slots)
+        self._frames.renumber(now, self._sorted)
 
-    @in_turn
+    @exclusive
     def _move_to(self, which: Group | Particle, position: ArrayLike) -> None:
         """`Group.move_to`: place particles as if just added, but with their velocities."""
         state, index = self._state, np.atleast_1d(which.index)
@@ -244,14 +244,14 @@ class Particles(Columns, Shared):
             return
         if np.ndim(position) == 1:
             here = state.position[index].astype(np.float64)
-            shape = state.seam.nearest(here - here[0])  # also for a group across the periodic boundary
+            shape = state.periodic.nearest(here - here[0])  # also for a group across the periodic boundary
             goal = goal + shape - shape.mean(axis=0)
         elif len(goal) != len(index):
             raise InputError(f"position has shape {goal.shape}; allowed is (2,), for their centre, or ({len(index)}, 2)")
         where = np.ascontiguousarray(goal, state.dtype)
         self._places(where, *(getattr(state, name)[index] for name in _MET), allowed="free places, and any for pinned ones")
-        inside = state.seam.wrapped(where)
-        state.crossed[index] = state.seam.periods(where.astype(np.float64) - inside)
+        inside = state.periodic.wrapped(where)
+        state.crossed[index] = state.periodic.periods(where.astype(np.float64) - inside)
         index, inside = index[moved := (inside != state.position[index]).any(axis=1)], inside[moved]
         lone = ~np.isin(index, self.links.joined())
         self._take_contacts()
@@ -263,12 +263,12 @@ class Particles(Columns, Shared):
 
     def _take_contacts(self, sleepers: Any = None) -> None:
         """Read the contacts of the last frame before the engine discards them. sleepers: contacts of sleeping particles."""
-        if self._touches is not None:
-            self._touches.take(self._state.shown["number"], self._frames.held.obstacles.count, sleepers)
+        if self._contact_records is not None:
+            self._contact_records.take(self._state.shown["number"], self._frames.held.obstacles.count, sleepers)
 
     def _renumber(self, now: Array) -> None:
         """Renumber particles in all objects that hold indices: new index, or -1 if removed."""
-        for holder in (self.links, self._events, self._touches, *self.forces):
+        for holder in (self.links, self._events, self._contact_records, *self.forces):
             if isinstance(holder, Numbered):
                 holder.renumber(now)
 
@@ -276,18 +276,18 @@ class Particles(Columns, Shared):
         return len(self._state)
 
     @property
-    @of_one_frame
+    @between_frames
     def number(self) -> Array:
         """(n,) a permanent number of each particle, ascending; a read-only view."""
         return self._state.number
 
     @property
-    @of_one_frame
+    @between_frames
     def group_number(self) -> NDArray[np.int64]:
         """(n,) the number of the `add` call that created each particle, from 0; it never changes."""
         return np.searchsorted(self._state.begun, self.number, side="right") - 1
 
-    @of_one_frame
+    @between_frames
     def index_of(self, numbers: ArrayLike) -> NDArray[np.int64]:
         """Current indices of the particles with these permanent numbers, as in `number` and the records of events and contacts.
 
@@ -302,7 +302,7 @@ class Particles(Columns, Shared):
         """
         return self._state.index_of(checks.numbers("numbers", numbers))
 
-    @of_one_frame
+    @between_frames
     def group_of(self, numbers: ArrayLike) -> NDArray[np.int64]:
         """Indices in `groups` of the groups that contain the particles with these numbers, removed ones included; see `index_of`.
 
@@ -313,7 +313,7 @@ class Particles(Columns, Shared):
         return np.where(known, np.searchsorted(self._state.begun, asked, side="right") - 1, -1)
 
     @property
-    @of_one_frame
+    @between_frames
     def groups(self) -> list[Group]:
         """A handle for each group, in the order they were added; groups whose particles were removed are empty."""
         state = self._state

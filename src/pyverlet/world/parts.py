@@ -11,10 +11,10 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from pyverlet.ground import checks
-from pyverlet.ground.arrays import Array
-from pyverlet.ground.errors import InputError
-from pyverlet.ground.fields import Field
+from pyverlet.common import checks
+from pyverlet.common.arrays import Array
+from pyverlet.common.errors import InputError
+from pyverlet.common.fields import Field
 from pyverlet.laws.events import CONTACT, HIT, Events
 from pyverlet.laws.ledger import EnergyLedger, Ledger
 from pyverlet.laws.links._set import BROKEN
@@ -59,14 +59,16 @@ PARTICLES = {
 }
 """The user's arrays, and the first particle of each group. Files of older versions lack `crossed`."""
 
-SLOTS = {
+SORTED_STATE = {
     "particle": Field(np.int32, "slots", least=0, below="slots", order="permutation"),
     "island": Field(np.int64, "sleepers", least=-1),
     "calm": Field(np.float32, "sleepers", least=0),
     "void": Field(np.bool_, "one"),
     "placed": Field(np.bool_, "particles"),
 }
-"""State by slot, in the engine's order."""
+"""State in the engine's order; the sleep timer is called `calm` in files."""
+
+_IN_FILES = {"sleep_timer": "calm"}
 
 NEWS = {
     "touching": Field(np.int64, "touching", least=0, order="ascending"),
@@ -96,8 +98,8 @@ IMPULSES = {
 }
 """Impulses of contacts in the last substep (`world.contact_memory.Memory`), and the positions at which they were listed."""
 
-_ROOMS = {"particles": PARTICLES, "slots": SLOTS, "news": NEWS, "impulses": IMPULSES, "asleep": ASLEEP}
-FIELDS = {f"{room}.{name}": field for room, fields in _ROOMS.items() for name, field in fields.items()}
+_GROUPS = {"particles": PARTICLES, "slots": SORTED_STATE, "news": NEWS, "impulses": IMPULSES, "asleep": ASLEEP}
+FIELDS = {f"{group}.{name}": field for group, fields in _GROUPS.items() for name, field in fields.items()}
 
 OWN = "data."
 """Prefix of the user's own arrays, whose names are in `facts["data"]`; see `state.data.Columns`."""
@@ -126,7 +128,7 @@ def take_apart(world: World) -> Parts:
     }  # fmt: skip
     arrays = {f"particles.{name}": array for name, array in saved.arrays.items()}
     arrays["particles.begun"] = np.array(world._state.begun, np.int64)
-    arrays |= {f"slots.{name}": column for name, column in saved.slots.items()}
+    arrays |= {f"slots.{_IN_FILES.get(name, name)}": column for name, column in saved.sorted_state.items()}
     memory = saved.impulses
     facts["impulses"] = {name: float(getattr(memory, name)) for name in STEP}
     if memory.kick:
@@ -197,7 +199,7 @@ def fill(world: World, parts: Parts) -> None:
         raise InputError(f"the array {error} is missing; allowed are files that have all") from None
     world._state.restore(arrays, _data(parts), own=True)
     most = int(arrays["number"][-1]) + 1 if len(world) else 0
-    world._state.numbers = checks.whole("numbers", parts.facts.get("numbers"), least=most, most=2**31)
+    world._state.numbers = checks.integer("numbers", parts.facts.get("numbers"), least=most, most=2**31)
     rewound = np.array(parts.facts.get("rewound") or np.zeros((0, 2)))
     Field(np.int64, "rewound", 2, least=0, most=2**31).check("rewound", rewound.astype(np.int64), world.dtype, {})
     world._state.begun, world._state.rewound = begun.tolist(), rewound.astype(np.int64)
@@ -234,12 +236,12 @@ def put_together(world: World, parts: Parts) -> Saved:
         world=world._state,
         arrays={name: parts.arrays[f"particles.{name}"] for name, _ in world._state.arrays()},
         time=checks.number("time", facts["time"]),
-        frames=checks.whole("frames", facts.get("frames"), least=0, most=_MOST),
+        frames=checks.integer("frames", facts.get("frames"), least=0, most=_MOST),
         next_birth=world._state.next_birth,
-        slots=_slots(world, parts.arrays),
+        sorted_state=_sorted_rows(world, parts.arrays),
         impulses=_impulses(world, facts.get("impulses") or {}, parts.arrays),
         energy_ledger=_energy_ledger(facts["books"]) if world.keeps_ledger else None,
-        events=_events(world, facts, parts.arrays) if world.tells_events else None,
+        events=_events(world, facts, parts.arrays) if world.records_events else None,
         sleep=_sleep(world, facts["sleep"], parts.arrays) if world._sleep else None,
         obstacles=world.obstacles.save(),
         actors=[(actor, actor.save()) for actor in world.actors],
@@ -249,12 +251,14 @@ def put_together(world: World, parts: Parts) -> Saved:
     )
 
 
-def _slots(world: World, arrays: dict[str, Array]) -> dict[str, Array]:
-    slots = {name: arrays[f"slots.{name}"] for name in SLOTS if name != "placed" or f"slots.{name}" in arrays}
-    count = len(slots["particle"])
-    if count > len(world) or len(slots["island"]) != (count if world._sleep else 0):
+def _sorted_rows(world: World, arrays: dict[str, Array]) -> dict[str, Array]:
+    now = {old: new for new, old in _IN_FILES.items()}
+    there = (name for name in SORTED_STATE if name != "placed" or f"slots.{name}" in arrays)
+    sorted_state = {now.get(name, name): arrays[f"slots.{name}"] for name in there}
+    count = len(sorted_state["particle"])
+    if count > len(world) or len(sorted_state["island"]) != (count if world._sleep else 0):
         raise InputError(f"slots.particle has {count} rows; allowed are at most {len(world)}, one for each particle")
-    return slots
+    return sorted_state
 
 
 def _impulses(world: World, facts: Facts, arrays: dict[str, Array]) -> Memory:
@@ -285,7 +289,7 @@ def _impulses(world: World, facts: Facts, arrays: dict[str, Array]) -> Memory:
             "for each row of impulses.given, or none"
         )
     for number in skin[4:]:  # counts
-        checks.whole("skin", int(number), least=0, most=_MOST)
+        checks.integer("skin", int(number), least=0, most=_MOST)
     asleep = Remembered.taken_up(arrays, len(world), world.dtype)
     world._obstacle_arrays.begin()
     there = SIDES + len(world._obstacle_arrays.segments)
@@ -355,7 +359,7 @@ def _broken(arrays: dict[str, Array]) -> Array:
 
 def _sleep(world: World, facts: Facts, arrays: dict[str, Array]) -> Sleep:
     sleep = Sleep()
-    sleep._next = checks.whole("next", facts["next"], least=0, most=_MOST)
+    sleep._next = checks.integer("next", facts["next"], least=0, most=_MOST)
     sleep._members = dict(zip(arrays["news.islands"].tolist(), arrays["news.members"].tolist(), strict=True))
     asleep = np.unique(arrays["slots.island"])
     if lost := set(asleep[asleep >= 0].tolist()) - sleep._members.keys():

@@ -7,46 +7,53 @@ from typing import Any
 import numpy as np
 
 from pyverlet import core
-from pyverlet.ground.checked import Checked, changes
-from pyverlet.ground.errors import PyverletError
-from pyverlet.ground.interrupts import whole
-from pyverlet.ground.step_lock import in_turn
+from pyverlet.common.checked import Checked, changes
+from pyverlet.common.errors import PyverletError
+from pyverlet.common.interrupts import without_interrupts
+from pyverlet.common.step_lock import exclusive
 from pyverlet.laws.gains import most_gained
 from pyverlet.laws.obstacles import journal
 from pyverlet.laws.precision import fine_up_to
 from pyverlet.state.state import MARKS, SET, moving
 from pyverlet.world.core_arrays import SORTED_FROM
 from pyverlet.world.long_frames import LONGEST
-from pyverlet.world.materials import ROOMS
+from pyverlet.world.materials import BOUNDARIES
 
-_WORLD = ("actors", "onlooker", "_touches")
+_WORLD = ("actors", "observer", "_contact_records")
 """Attributes that must stay the same; all others have setters or belong to other frames, which end plain frames."""
 
 
 def plain_frames(world: Any, dt: float) -> Any:
     """An object that runs frames like the last one, of dt seconds; None if more than motion may change in them."""
-    frames, state, slots, obstacles, room = world._frames, world._state, world._slots, world._obstacle_arrays, world._boundary
+    frames, state, sorted_state, obstacles, boundary = (
+        world._frames,
+        world._state,
+        world._sorted,
+        world._obstacle_arrays,
+        world._boundary,
+    )
     held = frames.held
     if not (
         frames.repeats
         and frames.gravity is world.gravity
-        and 0 < len(slots) < SORTED_FROM
+        and 0 < len(sorted_state) < SORTED_FROM
         and dt <= LONGEST
         and held.steps == world._substeps
-        and type(room) in ROOMS
-        and not (world.forces or world.links or world.actors or obstacles.moving or slots.seam or slots.others)
-        and world.onlooker is world._events is world._sleep is world._energy_ledger is None
-        and not (slots.own_inertia or held.parting)
-        and all(isinstance(value, float | int | str | tuple) for value in vars(room).values())
+        and type(boundary) in BOUNDARIES
+        and not (world.forces or world.links or world.actors or obstacles.moving or sorted_state.periodic or sorted_state.others)
+        and world.observer is world._events is world._sleep is world._energy_ledger is None
+        and not (sorted_state.own_inertia or held.parting)
+        and all(isinstance(value, float | int | str | tuple) for value in vars(boundary).values())
     ):
         return None
-    walls = [(room, name, value) for name, value in vars(room).items()]
-    checked = [wall for wall in walls if isinstance(getattr(type(room), wall[1], None), Checked)]
-    limited = (world._collisions and len(slots) > 1) or obstacles.solid
+    walls = [(boundary, name, value) for name, value in vars(boundary).items()]
+    checked = [wall for wall in walls if isinstance(getattr(type(boundary), wall[1], None), Checked)]
+    limited = (world._collisions and len(sorted_state) > 1) or obstacles.solid
     most = most_gained(world) if limited else np.inf
-    precise = fine_up_to(slots, float(np.hypot(*world.gravity)), slots.h, world._substeps)
+    precise = fine_up_to(sorted_state, float(np.hypot(*world.gravity)), sorted_state.h, world._substeps)
     return core.unit("engine", state.dtype).PlainFrames(
-        held.engine, state.turn, moving(slots), slots.placed, moving(state), slots.particle, state.shown["angle"], slots.mass,
+        held.engine, state.lock, moving(sorted_state), sorted_state.placed, moving(state), sorted_state.particle,
+        state.shown["angle"], sorted_state.mass,
         [state.shown[name] for name in SET], [state.shown[name] for name in MARKS],
         np.array((dt, world._substeps, *world.gravity, most, precise)),
         [
@@ -59,7 +66,7 @@ def plain_frames(world: Any, dt: float) -> Any:
     )  # fmt: skip
 
 
-@in_turn
+@exclusive
 def follow(world: Any, dt: float) -> bool:
     """Whether obstacles have changed since plain frames of dt seconds were prepared; they are then passed to the core.
 
@@ -93,10 +100,10 @@ def _end(world: Any, plain: Any) -> None:
     Raises:
         NonFiniteError: a particle turned NaN or infinite; the world still holds the frame before.
     """
-    with whole:
+    with without_interrupts:
         try:
             world._frames.end_plain(world, plain)
-            world._slots.scatter(world._state, plain.dt, world._frames.held.still())
+            world._sorted.scatter(world._state, plain.dt, world._frames.held.still())
         except PyverletError:
             world._plain = None
             raise

@@ -76,16 +76,16 @@ class Profile:
     @property
     def stages(self) -> dict[str, float]:
         """Milliseconds by stage of the last complete frame."""
-        return _named(self.plain[0]) if self.plain[0, -1] else _told(self._complete)
+        return _named(self.plain[0]) if self.plain[0, -1] else _by_stage(self._complete)
 
     @property
     def total_ms(self) -> dict[str, float]:
         """Milliseconds by stage of all complete frames."""
-        plain, others = _named(self.plain[1]), _told(self._total.copy())
+        plain, others = _named(self.plain[1]), _by_stage(self._total.copy())
         return {stage: plain.get(stage, 0.0) + others.get(stage, 0.0) for stage in others | plain}
 
 
-def _told(spent: dict[str, float]) -> dict[str, float]:
+def _by_stage(spent: dict[str, float]) -> dict[str, float]:
     """Seconds to milliseconds, by stage."""
     return {stage: 1e3 * seconds for stage, seconds in spent.items() if seconds > 0}
 

@@ -8,15 +8,15 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from pyverlet.common import checks
+from pyverlet.common.arrays import Array, Floats, Indices
+from pyverlet.common.errors import InputError
+from pyverlet.common.shown import count
+from pyverlet.common.step_lock import Shared, between_frames
 from pyverlet.core import unit
-from pyverlet.ground import checks
-from pyverlet.ground.arrays import Array, Floats, Indices
-from pyverlet.ground.errors import InputError
-from pyverlet.ground.shown import count
-from pyverlet.ground.step_lock import Shared, of_one_frame
 from pyverlet.state.neighbours import FEW, Images, Near, cells_of, check_range, near, regions
-from pyverlet.state.seam import Seam
-from pyverlet.state.state import State, meet
+from pyverlet.state.periodicity import Periodicity
+from pyverlet.state.state import State, may_collide
 
 ROUNDING = 1e-9
 """Tolerance of overlap tests: a circle that just fits is not refused for rounding."""
@@ -48,7 +48,7 @@ class Queries(Shared):
     _kept: tuple[Array, Array, dict[tuple[Any, ...], Any]] | None = None
     """Cache: positions and radii at the last query, and the results of `_seen` for them."""
 
-    @of_one_frame
+    @between_frames
     def at_point(self, points: ArrayLike) -> Indices:
         """(q,) the particle whose disc covers each point (q, 2) or (2,), m; of several the nearest centre, -1 for none."""
         where = checks.rows("points", points, np.dtype(float))
@@ -60,7 +60,7 @@ class Queries(Shared):
         found[q[best]] = i[best]
         return found
 
-    @of_one_frame
+    @between_frames
     def in_box(self, lower: ArrayLike, upper: ArrayLike) -> Indices:
         """The particles whose centre is in the box from `lower` to `upper`, rim included, ascending.
 
@@ -80,7 +80,7 @@ class Queries(Shared):
             )
         return self._in(low, high, low, np.full(len(low), np.inf), many=np.ndim(lower) > 1 or np.ndim(upper) > 1)
 
-    @of_one_frame
+    @between_frames
     def in_circle(self, center: ArrayLike, radius: ArrayLike) -> Indices:
         """The particles whose centre is no farther than `radius` from `center`, ascending.
 
@@ -95,21 +95,21 @@ class Queries(Shared):
         box = size[:, None]
         return self._in(middle - box, middle + box, middle, size, many=np.ndim(center) > 1 or np.ndim(radius) > 0)
 
-    @of_one_frame
+    @between_frames
     def nearest(self, points: ArrayLike, k: int = 1) -> Nearest:
         """The k particles whose centres are nearest to each point (q, 2) or (2,), m."""
         where = checks.rows("points", points, np.dtype(float))
-        count = checks.whole("k", k)
-        seam, found = self._state.seam, []
-        for shift in seam.images():
+        count = checks.integer("k", k)
+        periodic, found = self._state.periodic, []
+        for shift in periodic.images():
             found.append((np.full((len(where), count), -1, np.int64), np.full((len(where), count), np.inf)))
             if len(self._state):
                 (position, *_), cells = self._seen(len(where))
-                unit("tools", position.dtype).nearest_to(seam.wrapped(where) - shift, cells, position, *found[-1])
+                unit("tools", position.dtype).nearest_to(periodic.wrapped(where) - shift, cells, position, *found[-1])
         index, square = (np.concatenate(columns, axis=1) for columns in zip(*found, strict=True))
         return _nearest(index, square, count)
 
-    @of_one_frame
+    @between_frames
     def neighbours(self, range: float) -> Near:  # noqa: A002  (the word of pair_force, too)
         """All pairs of particles whose centres are nearer to each other than `range`, i < j, ascending by i, then j.
 
@@ -122,7 +122,7 @@ class Queries(Shared):
         Returns:
             i, j: (k,) int32 indices; distance: (k,) m; way: (k, 2), unit vectors from i to j; both float64.
         """
-        return near(self._state.position, check_range(range, self._state.seam), self._state.seam)
+        return near(self._state.position, check_range(range, self._state.periodic), self._state.periodic)
 
     def _seen(self, questions: int, margin: float | None = None, reach: float | None = None) -> tuple[Images, tuple[Any, ...]]:
         """Particles and their images within `margin` m of a periodic room, and the result of `cells_of`.
@@ -135,12 +135,14 @@ class Queries(Shared):
         if not known and not few:
             self._kept = s.position.copy(), s.radius.copy(), {}
         position, radius, lists = self._kept if self._kept and (known or not few) else (*here, {})
-        key = margin if s.seam else None, reach, s.seam
+        key = margin if s.periodic else None, reach, s.periodic
         if key not in lists:
             if len(lists) == MOST_LISTS:
                 lists.clear()
             seen = (
-                Images(s.seam.wrapped(position), radius, None) if key[0] is None else Images.of(position, radius, s.seam, key[0])
+                Images(s.periodic.wrapped(position), radius, None)
+                if key[0] is None
+                else Images.of(position, radius, s.periodic, key[0])
             )
             lists[key] = seen, cells_of(seen.position, seen.radius if reach is not None else None, reach or 0.0, few=few)
         found: tuple[Images, tuple[Any, ...]] = lists[key]
@@ -153,29 +155,31 @@ class Queries(Shared):
         s = self._state
         reach = size + float(s.radius.max(initial=0.0))
         q, i = self._in(middle - reach[:, None], middle + reach[:, None], middle, reach, many=True).T
-        square = (s.seam.nearest(s.position[i] - middle[q]) ** 2).sum(axis=1)
+        square = (s.periodic.nearest(s.position[i] - middle[q]) ** 2).sum(axis=1)
         touch = square <= (size[q] + s.radius[i]) ** 2
         return q[touch], i[touch], square[touch]
 
     def _in(self, low: Floats, high: Floats, middle: Floats, size: Floats, *, many: bool) -> Indices:
-        pairs, seam = np.zeros((0, 2), np.int64), self._state.seam
+        pairs, periodic = np.zeros((0, 2), np.int64), self._state.periodic
         if len(self._state) and len(low):
-            if seam:
-                low, high, middle = _in_first_room(low, high, middle, size, seam)
-            seen, cells = self._seen(len(low), float((high - low).max()) if seam else None)
+            if periodic:
+                low, high, middle = _in_first_period(low, high, middle, size, periodic)
+            seen, cells = self._seen(len(low), float((high - low).max()) if periodic else None)
             region, particle = regions(low, high, middle, size, cells, seen.position)
             keys = np.sort(region * len(self._state) + seen.named(particle))
-            keys = keys[np.diff(keys, prepend=-1) > 0] if seam else keys  # a region may contain two images of a particle
+            keys = keys[np.diff(keys, prepend=-1) > 0] if periodic else keys  # a region may contain two images of a particle
             pairs = np.column_stack(np.divmod(keys, len(self._state)))
         return pairs if many else np.ascontiguousarray(pairs[:, 1])
 
 
-def _in_first_room(low: Floats, high: Floats, middle: Floats, size: Floats, seam: Seam) -> tuple[Floats, Floats, Floats]:
+def _in_first_period(
+    low: Floats, high: Floats, middle: Floats, size: Floats, periodic: Periodicity
+) -> tuple[Floats, Floats, Floats]:
     """Regions shifted by whole periods into the room; boxes are at most one period wide."""
     where = np.where(np.isfinite(size)[:, None], middle, low)
-    move = seam.wrapped(where) - where
+    move = periodic.wrapped(where) - where
     low, high, middle = low + move, high + move, middle + move
-    for axis, (corner, period) in enumerate(((seam.low_x, seam.period_x), (seam.low_y, seam.period_y))):
+    for axis, (corner, period) in enumerate(((periodic.low_x, periodic.period_x), (periodic.low_y, periodic.period_y))):
         wide = (high[:, axis] - low[:, axis] >= period) & np.isinf(size) if period > 0 else np.zeros(len(low), bool)
         low[wide, axis], high[wide, axis] = corner, corner + period
     return low, high, middle
@@ -235,16 +239,16 @@ def on_others(state: State, new: Mapping[str, Array]) -> NDArray[np.int64]:
     position, radius, mass, category, mask = (
         np.concatenate((getattr(state, name), new[name])) for name in ("position", "radius", "mass", "category", "mask")
     )
-    j, i = on_top(position, radius, len(state), state.seam).T
-    apart = meet(category[i], mask[i], category[j], mask[j]) & np.isfinite(np.minimum(mass[i], mass[j]))
+    j, i = on_top(position, radius, len(state), state.periodic).T
+    apart = may_collide(category[i], mask[i], category[j], mask[j]) & np.isfinite(np.minimum(mass[i], mass[j]))
     return np.column_stack((j[apart] - len(state), i[apart]))
 
 
-def on_top(position: Array, radius: Array, there: int, seam: Seam) -> NDArray[np.int64]:
+def on_top(position: Array, radius: Array, there: int, periodic: Periodicity) -> NDArray[np.int64]:
     """(m, 2) rows (j, i), sorted: circle j >= `there` overlaps circle i < j. position: (n, 2), radius: (n,), m."""
     size = radius.astype(np.float64)
-    first = seam.wrapped(np.ascontiguousarray(position[there:])).astype(np.float64)
-    seen = Images.of(position, size, seam, 2 * float(size.max(initial=0.0)))
+    first = periodic.wrapped(np.ascontiguousarray(position[there:])).astype(np.float64)
+    seen = Images.of(position, size, periodic, 2 * float(size.max(initial=0.0)))
     places = seen.position.astype(np.float64)
     slack = DIGITS * float(np.finfo(position.dtype).eps) * float(np.abs(places).max(initial=0.0))
     k, image = overlapping(first, size[there:] - slack, places, seen.radius).T

@@ -6,8 +6,8 @@ import copy
 from dataclasses import dataclass
 from typing import Any
 
-from pyverlet.ground.arrays import Array
-from pyverlet.ground.errors import InputError
+from pyverlet.common.arrays import Array
+from pyverlet.common.errors import InputError
 from pyverlet.laws.events import Events
 from pyverlet.laws.ledger import EnergyLedger
 from pyverlet.laws.sleep import Sleep
@@ -28,7 +28,7 @@ class Saved:
     time: float
     frames: int
     next_birth: int
-    slots: dict[str, Array]
+    sorted_state: dict[str, Array]
     impulses: Any
     energy_ledger: EnergyLedger | None
     events: Events | None

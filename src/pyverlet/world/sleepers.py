@@ -7,8 +7,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from pyverlet.ground.errors import InputError
-from pyverlet.ground.fields import Field
+from pyverlet.common.errors import InputError
+from pyverlet.common.fields import Field
 
 Array = NDArray[Any]
 

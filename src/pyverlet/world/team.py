@@ -19,10 +19,10 @@ _KEPT = 24
 _GAIN = 0.95
 """More threads are kept only if they take less than this fraction of the time: other programs can use the cores better."""
 
-_HOPELESS = 1.6
+_TOO_SLOW = 1.6
 """If three of the last frames on more threads took so many times as long as on fewer, fewer are used: such frames are noticed."""
 
-_DISASTER = 8.0
+_FAR_TOO_SLOW = 8.0
 """One frame is enough if it took this many times as long: on a core shared with low-priority work it may take seconds."""
 
 _CHANGED = 1.25
@@ -95,7 +95,7 @@ class Team:
             return
         self._recent.append(ms)
         self._wait = [left - 1 for left in self._wait]
-        if self._now > 0 and self._fewer is not None and self._hopeless(self._recent, self._fewer):
+        if self._now > 0 and self._fewer is not None and self._too_slow(self._recent, self._fewer):
             self._put_off(2)
             self._settle(self._now - 1, deque())
         elif self._now > 0 and (self._wait[0] <= 0 or self._has_changed()):
@@ -116,20 +116,20 @@ class Team:
 
     def _judge_more(self) -> None:
         here = cost(self._recent)
-        disaster, hopeless = self._trial[-1] > _DISASTER * here, self._hopeless(self._trial, here)
-        if not (disaster or hopeless) and len(self._trial) < _RUN:
+        far_too_slow, too_slow = self._trial[-1] > _FAR_TOO_SLOW * here, self._too_slow(self._trial, here)
+        if not (far_too_slow or too_slow) and len(self._trial) < _RUN:
             return
-        if disaster or hopeless or cost(self._trial) >= _GAIN * here:
-            self._put_off(4 if disaster else 2)
+        if far_too_slow or too_slow or cost(self._trial) >= _GAIN * here:
+            self._put_off(4 if far_too_slow else 2)
             self._settle(self._now, self._recent)
         else:
             self._fewer, self._down = here, _SOONEST
             self._settle(self._other, self._trial)
 
     @staticmethod
-    def _hopeless(frames: deque[float], fewer: float) -> bool:
+    def _too_slow(frames: deque[float], fewer: float) -> bool:
         """Whether this number is too slow on a busy machine, if a smaller one costs `fewer`."""
-        return sum(ms > _HOPELESS * fewer for ms in [*frames][-_RUN:]) > 2
+        return sum(ms > _TOO_SLOW * fewer for ms in [*frames][-_RUN:]) > 2
 
     def _has_changed(self) -> bool:
         """Whether recent frames cost more than at the last judgement."""

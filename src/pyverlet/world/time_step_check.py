@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from pyverlet.ground.errors import CoarseStepsWarning
-from pyverlet.ground.shown import Shown
+from pyverlet.common.errors import CoarseStepsWarning
+from pyverlet.common.shown import Shown
 
 FRAMES = 20
 """Frames between checks."""
@@ -34,7 +34,7 @@ class TimeStepCheck:
             return
         for force in world.forces:
             if not isinstance(force, Shown) and getattr(force, "velocity_dependent", True):
-                found = h * _rate(force, world._slots, world.time)
+                found = h * _rate(force, world._sorted, world.time)
                 if found > limit:
                     self._said = True
                     warnings.warn(

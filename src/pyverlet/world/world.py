@@ -8,34 +8,35 @@ from typing import Any
 import numpy as np
 from numpy.typing import DTypeLike
 
-from pyverlet.ground import checks
-from pyverlet.ground.constants import ALL_THREADS_FROM, MOST_SUBSTEPS, ONE_THREAD_BELOW, STANDARD_GRAVITY
-from pyverlet.ground.errors import InputError, PyverletError
-from pyverlet.ground.step_lock import in_turn
-from pyverlet.ground.threads import max_threads
+from pyverlet.common import checks
+from pyverlet.common.constants import ALL_THREADS_FROM, MOST_SUBSTEPS, ONE_THREAD_BELOW, STANDARD_GRAVITY
+from pyverlet.common.errors import InputError, PyverletError
+from pyverlet.common.renamed import Renamed
+from pyverlet.common.step_lock import exclusive
+from pyverlet.common.threads import max_threads
+from pyverlet.laws.boundaries import Boundary, Open
 from pyverlet.laws.collisions import Collisions
+from pyverlet.laws.contact_records import ContactRecords
 from pyverlet.laws.events import Events, Place
 from pyverlet.laws.forces import ForceList, ForceSum
 from pyverlet.laws.integrators import Integrator, TimeCorrectedVerlet
-from pyverlet.laws.ledger import EnergyLedger, Page
+from pyverlet.laws.ledger import EnergyLedger, FrameLedger
 from pyverlet.laws.links import Links
 from pyverlet.laws.obstacles import ObstacleArrays, Obstacles
 from pyverlet.laws.precision import Precision
-from pyverlet.laws.rooms import Boundary, Open
 from pyverlet.laws.sleep import Sleep, laws
-from pyverlet.laws.touches import Touches
-from pyverlet.state.slots import Slots
+from pyverlet.state.sorted_state import SortedState
 from pyverlet.state.state import State
 from pyverlet.world.actors import Actors, act_after, act_once, have_own
 from pyverlet.world.casts import Casts
 from pyverlet.world.contact_rules import ContactRule
-from pyverlet.world.convenience import Doors
+from pyverlet.world.convenience import ConvenienceMethods
 from pyverlet.world.frames import Frames
 from pyverlet.world.measures import Measures
-from pyverlet.world.moments import Moment
 from pyverlet.world.plain import follow, plain_frames
 from pyverlet.world.profile import Profile
 from pyverlet.world.saved import Saved
+from pyverlet.world.substep_snapshot import SubstepSnapshot
 from pyverlet.world.team import Team
 
 LONGEST_PAUSE = 15
@@ -44,7 +45,7 @@ LONGEST_PAUSE = 15
 _DEFAULT_COLLISIONS = Collisions()  # for unspecified arguments, since None means no collisions
 
 
-class World(Measures, Casts, Doors):
+class World(Measures, Casts, ConvenienceMethods):
     """Particles in a room, and the laws they follow. SI units, y up.
 
     Args:
@@ -74,6 +75,7 @@ class World(Measures, Casts, Doors):
         InputError: an argument is outside what is allowed.
     """
 
+    onlooker: Any = Renamed("observer")
     _plain: Any = None  # runs plain frames while they last
     _extent: Any = None  # extent of the room for which circles have been checked
     _vain = _pause = 0  # consecutive plain frames objects that made no frame; frames to wait
@@ -96,10 +98,11 @@ class World(Measures, Casts, Doors):
         asked = {"ledger": ledger, "events": events, "contacts": contacts, "sleep": sleep}
         ledger, events, contacts, sleep = (checks.flag(name, value) for name, value in asked.items())
         self._state = State(checks.floating("dtype", dtype))
-        self._slots = Slots(self._state.dtype, sleeps=sleep)
+        self._sorted = SortedState(self._state.dtype, sleeps=sleep)
         self.links, self.forces, self.obstacles = Links(self._state), ForceList(), Obstacles()
         self._frames = Frames(self._state.dtype)
-        self._events, self._touches = Events() if events else None, Touches(self._frames.held.engine) if contacts else None
+        self._events = Events() if events else None
+        self._contact_records = ContactRecords(self._frames.held.engine) if contacts else None
         self._sleep, self._energy_ledger = Sleep() if sleep else None, EnergyLedger() if ledger else None
         self._force_sum = ForceSum(checks.vector("gravity", gravity), self.forces)
         self._obstacle_arrays = ObstacleArrays(self.obstacles)
@@ -110,7 +113,7 @@ class World(Measures, Casts, Doors):
         self._team, self._precision = Team(), Precision()
         self._kept = None
         # Called between the substeps of a frame. It may read, and change gravity; other changes take effect in the next frame.
-        self.onlooker: Callable[[Moment], None] | None = None
+        self.observer: Callable[[SubstepSnapshot], None] | None = None
 
     # ---- one frame -----------------------------------------------------------------------------------------------------
 
@@ -127,7 +130,7 @@ class World(Measures, Casts, Doors):
         if self._plain is None or self._plain.far:
             self._precision.look(self, dt / self.substeps)
 
-    @in_turn
+    @exclusive
     def _step(self, dt: float) -> None:
         """Run a frame in which anything may have changed."""
         checks.number("dt", dt, above=0.0)
@@ -136,11 +139,11 @@ class World(Measures, Casts, Doors):
             self._pause, self._plain = min((1 << self._vain) - 1, LONGEST_PAUSE), None
         if self.actors:
             act_once(self, dt)
-        with self._state.turn.frame():
-            self._team.gather(self.threads, 0.0 if self._slots.taken else self.profile.frame_ms)
+        with self._state.lock.frame():
+            self._team.gather(self.threads, 0.0 if self._sorted.taken else self.profile.frame_ms)
             self.profile.begin()
-            ledger, memories = Page(self) if self._energy_ledger else None, self._memories()
-            self._slots.thread_team = self._frames.held.engine.thread_team, self._frames.held.parts
+            ledger, memories = FrameLedger(self) if self._energy_ledger else None, self._memories()
+            self._sorted.thread_team = self._frames.held.engine.thread_team, self._frames.held.parts
             try:
                 try:
                     self._frames.step(self, dt, ledger or self.profile.mark)
@@ -150,7 +153,7 @@ class World(Measures, Casts, Doors):
                     raise
                 self._accept(dt, ledger)
             finally:
-                self._slots.thread_team = (0, 1)
+                self._sorted.thread_team = (0, 1)
         if self._pause == 0:
             self._plain = plain_frames(self, dt)
         self._pause = max(self._pause - 1, 0)
@@ -159,13 +162,13 @@ class World(Measures, Casts, Doors):
 
     def _accept(self, dt: float, ledger: Any) -> None:
         """Commit a successful frame: copy its results to the user's arrays."""
-        self._slots.scatter(self._state, dt, self._frames.held.still())
+        self._sorted.scatter(self._state, dt, self._frames.held.still())
         if ledger:
-            ledger.close(-self._slots.taken)
+            ledger.close(-self._sorted.taken)
         self._obstacle_arrays.end(dt)
         self._frames.links.end(self.links)
         if self._events:
-            self._events.close(self._slots, self._state, Place(self.boundary, self._obstacle_arrays, bool(self.collisions)))
+            self._events.close(self._sorted, self._state, Place(self.boundary, self._obstacle_arrays, bool(self.collisions)))
         self.profile.mark("scatter")
         self.time, self.frames = self.time + dt, self.frames + 1
         self.profile.divide("contacts", self._frames.held.engine.spans())
@@ -174,18 +177,18 @@ class World(Measures, Casts, Doors):
     def _gather(self) -> bool:
         """Read the user's changes; returns whether the pair list is invalid."""
         self.forces.check(self._state)
-        woken = self._sleep.begin(self._slots, self._state, laws(self)) if self._sleep else False
-        changed = self._slots.gather(self._state) or woken
+        woken = self._sleep.begin(self._sorted, self._state, laws(self)) if self._sleep else False
+        changed = self._sorted.gather(self._state) or woken
         extent = self.boundary.extent()  # sides of the room may be set while circles are in it
-        if self._slots.unchecked or extent != self._extent:
+        if self._sorted.unchecked or extent != self._extent:
             try:
-                self._slots.check()
+                self._sorted.check()
                 self.boundary.check(self._state.shown["radius"])
             except InputError:
                 # The next frame then checks the same values again.
-                self._slots = Slots(self.dtype, sleeps=self._sleep is not None)
+                self._sorted = SortedState(self.dtype, sleeps=self._sleep is not None)
                 raise
-            self._slots.unchecked, self._extent = False, extent
+            self._sorted.unchecked, self._extent = False, extent
         return changed
 
     def _memories(self) -> list[tuple[Any, Any]]:
@@ -194,13 +197,13 @@ class World(Measures, Casts, Doors):
 
     def _show(self, since: float, lag: float) -> None:
         """Call the observer at `since` s after the start of the frame, with velocities `lag` s old."""
-        assert self.onlooker
-        self.onlooker(Moment(self._slots, self.time + since, lag))
+        assert self.observer
+        self.observer(SubstepSnapshot(self._sorted, self.time + since, lag))
         self.profile.mark("pictures")
 
-    def _clear_notes(self) -> None:
+    def _clear_records(self) -> None:
         """Clear the records of walls and contacts for a new frame."""
-        self._slots.clear_notes()
+        self._sorted.clear_records()
         if self._events:
             self._events.forget()
 
@@ -226,10 +229,10 @@ class World(Measures, Casts, Doors):
         return self._substeps
 
     @substeps.setter
-    @in_turn
+    @exclusive
     def substeps(self, value: int) -> None:
         self._plain = None
-        self._substeps = checks.whole("substeps", value, most=MOST_SUBSTEPS, most_is=" (finer steps take a smaller dt)")
+        self._substeps = checks.integer("substeps", value, most=MOST_SUBSTEPS, most_is=" (finer steps take a smaller dt)")
 
     @property
     def integrator(self) -> Integrator:
@@ -237,7 +240,7 @@ class World(Measures, Casts, Doors):
         return self._integrator
 
     @integrator.setter
-    @in_turn
+    @exclusive
     def integrator(self, value: Integrator) -> None:
         if not isinstance(value, Integrator):
             raise InputError(f"integrator is {value!r}; allowed is an object such as pyverlet.PositionVerlet()")
@@ -250,14 +253,19 @@ class World(Measures, Casts, Doors):
         return self._boundary
 
     @boundary.setter
-    @in_turn
+    @exclusive
     def boundary(self, value: Boundary) -> None:
         if not isinstance(value, Boundary):
             raise InputError(f"boundary is {value!r}; allowed is an object such as pyverlet.Circle(radius=10) or pyverlet.Open()")
         value.check(self._state.radius)
-        self.links.check(value.seam)
-        self._boundary, self._state.seam, self._obstacle_arrays.seam, self._plain = value, value.seam, value.seam, None
-        self._state.room, self._state.let_go = value, True
+        self.links.check(value.periodic)
+        self._boundary, self._state.periodic, self._obstacle_arrays.periodic, self._plain = (
+            value,
+            value.periodic,
+            value.periodic,
+            None,
+        )
+        self._state.boundary, self._state.let_go = value, True
 
     @property
     def collisions(self) -> Collisions | None:
@@ -265,7 +273,7 @@ class World(Measures, Casts, Doors):
         return self._collisions
 
     @collisions.setter
-    @in_turn
+    @exclusive
     def collisions(self, value: Collisions | None) -> None:
         if value is not None and not isinstance(value, Collisions):
             raise InputError(f"collisions is {value!r}; allowed are pyverlet.Collisions(...) and None")
@@ -285,11 +293,13 @@ class World(Measures, Casts, Doors):
 
     @threads.setter
     def threads(self, value: int | None) -> None:
-        self._threads = None if value is None else checks.whole("threads", value, most=max_threads(), most_is=" (the cores here)")
+        self._threads = (
+            None if value is None else checks.integer("threads", value, most=max_threads(), most_is=" (the cores here)")
+        )
 
     # ---- save and restore ----------------------------------------------------------------------------------------------
 
-    @in_turn
+    @exclusive
     def save(self) -> Saved:
         """A copy of everything that moves; `restore` continues from it with the same bits."""
         have_own(self)
@@ -301,7 +311,7 @@ class World(Measures, Casts, Doors):
             time=self.time,
             frames=self.frames,
             next_birth=self._state.next_birth,
-            slots=self._slots.save(self._state),
+            sorted_state=self._sorted.save(self._state),
             impulses=self._frames.save(self._obstacle_arrays),
             energy_ledger=self._energy_ledger and self._energy_ledger.copy(),
             events=self._events and self._events.copy(),
@@ -313,7 +323,7 @@ class World(Measures, Casts, Doors):
             data={name: column.copy() for name, column in self._state.data.items()},
         )
 
-    @in_turn
+    @exclusive
     def restore(self, saved: Saved) -> None:
         """Go back to what `save` returned. Groups added since then become invalid; removed particles are alive again.
 
@@ -337,7 +347,7 @@ class World(Measures, Casts, Doors):
         for actor, memory in saved.actors:
             actor.restore(memory)
         self.time, self.frames = saved.time, saved.frames
-        self._slots.restore(saved.slots, self._state)
+        self._sorted.restore(saved.sorted_state, self._state)
         self._energy_ledger = saved.energy_ledger and saved.energy_ledger.copy()
         if self._sleep and saved.sleep:
             self._sleep.take(saved.sleep, laws(self))

@@ -7,7 +7,7 @@ and printed.
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
-from pyverlet.ground.errors import InputError
+from pyverlet.common.errors import InputError
 from pyverlet.lab.fuzz.program import Program, random_program, shrink
 from pyverlet.lab.fuzz.watch import CHECKS, Broken, check
 

@@ -26,16 +26,16 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from pyverlet.common.errors import InputError, NonFiniteError
+from pyverlet.common.threads import max_threads
 from pyverlet.data import snapshot
-from pyverlet.ground.errors import InputError, NonFiniteError
-from pyverlet.ground.threads import max_threads
 from pyverlet.lab.fuzz.program import Build, Change
 from pyverlet.lab.physics.energy import MOST, PARTING_S, scale
+from pyverlet.laws.boundaries import Open
 from pyverlet.laws.forces import ConstantForce, Drag, PointSpring, Wind
 from pyverlet.laws.gains import pinned_move, undriven
 from pyverlet.laws.integrators import Yoshida4
 from pyverlet.laws.links import Pin
-from pyverlet.laws.rooms import Open
 from pyverlet.world.world import World
 
 
@@ -50,8 +50,8 @@ def stored(world: World, h: float) -> tuple[float, float]:
     with np.errstate(divide="ignore"):
         weight = 1.0 / world.mass.astype(float)
     stiffness = np.where(np.isfinite(pool.rows["stiffness"]), pool.rows["stiffness"], 0.0)
-    part = 1.0 / np.maximum(stiffness * pool.mobility(place, weight, world._state.seam) * h * h, 1.0)
-    return float((pool.energies(place, world._state.seam) * part).sum()), float((stiffness * part).sum())
+    part = 1.0 / np.maximum(stiffness * pool.mobility(place, weight, world._state.periodic) * h * h, 1.0)
+    return float((pool.energies(place, world._state.periodic) * part).sum()), float((stiffness * part).sum())
 
 
 def rounded(world: World, held: float, stiff: float) -> float:
@@ -124,7 +124,7 @@ def _check(build: Build, change: Change, frames: int, dt: float, made: frozenset
         settling = _frame(world, change, frame, dt, made, seen, settling=settling)
     saved, file = world.save(), None
     if "file" in made and not world.actors and len(world) < 1000:
-        with tempfile.TemporaryDirectory() as folder, _told("file", world.frames):
+        with tempfile.TemporaryDirectory() as folder, _explained("file", world.frames):
             path = Path(folder) / "world.pvsnap"
             snapshot.save(world, path)
             file = snapshot.load(path, exact=True)
@@ -143,7 +143,7 @@ def _check(build: Build, change: Change, frames: int, dt: float, made: frozenset
         _run(file, change, range(half, frames), dt)
         _same("file", half, end, file.state_hash())
     if "restore" in made:
-        with _told("restore", half):
+        with _explained("restore", half):
             world.restore(saved)
         _run(world, change, range(half, frames), dt)
         _same("restore", half, end, world.state_hash())
@@ -191,7 +191,7 @@ def _same(name: str, frame: int, one: str, other: str) -> None:
 
 
 @contextmanager
-def _told(name: str, frame: int) -> Iterator[None]:
+def _explained(name: str, frame: int) -> Iterator[None]:
     """Context that attributes errors to this check; also `InputError`, as the program is not at fault there."""
     try:
         yield
@@ -208,15 +208,15 @@ def _frame(world: World, change: Change, frame: int, dt: float, made: frozenset[
     steps become shorter, until it is gone. So have links that an obstacle has stretched by pushing out particles that started
     inside it, or that a change has stretched by moving their circles.
     """
-    before_deed, forces, places = (world.version, world.substeps), tuple(world.forces), world.position.copy()
+    before_action, forces, places = (world.version, world.substeps), tuple(world.forces), world.position.copy()
     energy_then, linked = world.energy().total, bool(world.links)
     change(world, frame)
     looks: list[Callable[[], None]] = []
     moved = not np.array_equal(places, world.position)
-    touched = moved or before_deed != (world.version, world.substeps) or energy_then != world.energy().total
+    touched = moved or before_action != (world.version, world.substeps) or energy_then != world.energy().total
     touched |= bool(linked and not world.links)
     touched |= frame == 0 and len(world.obstacles) > 0  # obstacles push out particles that start inside them
-    eases = (moved and linked) or before_deed[1] != world.substeps
+    eases = (moved and linked) or before_action[1] != world.substeps
     eases |= bool(frame == 0 and world.links and _in_obstacles(world))
     h = dt / world.substeps
     about_energy = "links" if world.links else "energy"

@@ -3,8 +3,8 @@
 To add one: a function that returns a `Result`, with the equation in its docstring, and a line in CHECKS.
 """
 
-from pyverlet.ground.errors import InputError
-from pyverlet.ground.guess import did_you_mean
+from pyverlet.common.errors import InputError
+from pyverlet.common.guess import did_you_mean
 from pyverlet.lab.physics import energy, friction, gas, lost, rest
 from pyverlet.lab.physics._check import Check, Result
 

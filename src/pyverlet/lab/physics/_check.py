@@ -7,10 +7,10 @@ from typing import Any
 
 import numpy as np
 
-from pyverlet.ground.arrays import Array
-from pyverlet.ground.errors import NonFiniteError
+from pyverlet.common.arrays import Array
+from pyverlet.common.errors import NonFiniteError
+from pyverlet.laws.boundaries import Boundary
 from pyverlet.laws.collisions import Collisions
-from pyverlet.laws.rooms import Boundary
 from pyverlet.world.world import World
 
 
@@ -55,9 +55,9 @@ DT = 1 / 60  # length of a frame, s
 RADIUS = 0.5  # of a circle, m, except in checks of sizes
 
 
-def circles(place: Array, room: Boundary, *, velocity: Any = 0.0, e: float = 0.0, mu: float = 0.0, **settings: Any) -> World:
+def circles(place: Array, boundary: Boundary, *, velocity: Any = 0.0, e: float = 0.0, mu: float = 0.0, **settings: Any) -> World:
     """A world of circles (n, 2) of the usual size in a room; e and mu are theirs, `settings` of `World`."""
-    world = World(boundary=room, collisions=Collisions(restitution=e, friction=mu), **settings)
+    world = World(boundary=boundary, collisions=Collisions(restitution=e, friction=mu), **settings)
     world.add(position=place, velocity=velocity, radius=RADIUS)
     return world
 

@@ -7,10 +7,10 @@ import numpy as np
 
 from pyverlet import scenes
 from pyverlet.lab.physics._check import RADIUS, G, Result, circles, directions, fastest, frames, in_disc
+from pyverlet.laws.boundaries import Box, Circle
 from pyverlet.laws.forces import Conservative, PointSpring
 from pyverlet.laws.links import Motor
-from pyverlet.laws.naive import Naive
-from pyverlet.laws.rooms import Box, Circle
+from pyverlet.laws.textbook import TextbookBoundary
 from pyverlet.world.world import World
 
 MOST = 1e-4  # relative rise per frame
@@ -76,7 +76,7 @@ def undriven_scenes() -> dict[str, Build]:
         turns = isinstance(world.boundary, Circle) and world.boundary.angular_velocity != 0.0
         driven = turns or any(obstacle.moves or obstacle.surface_speed for obstacle in world.obstacles)
         driven |= bool(world.actors) or any(isinstance(link, Motor) for link in world.links)
-        honest = not isinstance(world.boundary, Naive) and world.integrator.symplectic
+        honest = not isinstance(world.boundary, TextbookBoundary) and world.integrator.symplectic
         if honest and not driven and all(isinstance(force, Conservative) for force in world.forces):
             found[name] = partial(scene.world, particles=min(scene.defaults.particles, 400))
     return found
@@ -85,8 +85,8 @@ def undriven_scenes() -> dict[str, Build]:
 def elastic_gas(substeps: int, particles: int = 300) -> World:
     """Elastic circles under gravity in a box."""
     velocity = np.random.default_rng(0).normal(0, 5, (particles, 2))
-    room = Box((-20, -20), (20, 20), restitution=1.0)
-    return circles(in_disc(particles, 15, 1.5), room, velocity=velocity, e=1.0, substeps=substeps)
+    boundary = Box((-20, -20), (20, 20), restitution=1.0)
+    return circles(in_disc(particles, 15, 1.5), boundary, velocity=velocity, e=1.0, substeps=substeps)
 
 
 def drawn_gas(substeps: int, particles: int = 200) -> World:
@@ -102,14 +102,16 @@ def overlapped(substeps: int, *, gravity: float, restitution: float, friction: f
     rng = np.random.default_rng(4)
     size = RADIUS * np.sqrt(particles / 0.6)
     angle, out = rng.uniform(0, 2 * np.pi, particles), (size - RADIUS) * np.sqrt(rng.uniform(0, 1, particles))
-    room = Circle(radius=size, restitution=restitution, friction=friction)
-    return circles(out[:, None] * directions(angle), room, e=restitution, mu=friction, gravity=(0, -gravity), substeps=substeps)
+    boundary = Circle(radius=size, restitution=restitution, friction=friction)
+    return circles(
+        out[:, None] * directions(angle), boundary, e=restitution, mu=friction, gravity=(0, -gravity), substeps=substeps
+    )
 
 
 def coincident(substeps: int, *, gravity: float, restitution: float = 0.0, particles: int = 100) -> World:
     """All circles at one point of a cage."""
-    room = Circle(radius=20, restitution=restitution)
-    return circles(np.zeros((particles, 2)), room, e=restitution, gravity=(0, -gravity), substeps=substeps)
+    boundary = Circle(radius=20, restitution=restitution)
+    return circles(np.zeros((particles, 2)), boundary, e=restitution, gravity=(0, -gravity), substeps=substeps)
 
 
 def never_rises(worlds: dict[str, Build], seconds: float, counts: tuple[int, ...] = SUBSTEPS) -> Result:

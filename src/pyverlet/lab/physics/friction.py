@@ -10,9 +10,9 @@ from numpy.typing import DTypeLike
 
 from pyverlet import scenes
 from pyverlet.lab.physics._check import DT, RADIUS, G, Result, frames
+from pyverlet.laws.boundaries import Boundary, Box, Circle, Open
 from pyverlet.laws.collisions import Collisions
 from pyverlet.laws.integrators import VelocityVerlet
-from pyverlet.laws.rooms import Boundary, Box, Circle, Open
 from pyverlet.world.world import World
 
 RESTITUTIONS = (0.0, 0.3, 0.5, 0.8, 0.95, 1.0)
@@ -146,8 +146,8 @@ def heap_angles(mu: float, heaps: int, particles: int) -> list[float]:
     """
     small, half, apart = 0.1, 4.0, 24.0
     middle = apart * np.arange(heaps)
-    room = Box((-apart / 2, -8), (apart * (heaps - 0.5), 40), friction=mu)
-    world = World(boundary=room, collisions=Collisions(friction=mu))
+    boundary = Box((-apart / 2, -8), (apart * (heaps - 0.5), 40), friction=mu)
+    world = World(boundary=boundary, collisions=Collisions(friction=mu))
     x = np.add.outer(middle, np.arange(-half, half + small, 2 * small)).ravel()
     plates = len(world.add(position=np.column_stack((x, np.zeros(len(x)))), radius=small, mass=np.inf))
     chance = [np.random.default_rng(seed) for seed in range(heaps)]

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pyverlet.lab.physics._check import RADIUS, Result, circles, directions, frames, in_disc
-from pyverlet.laws.rooms import Box, Circle, Periodic
+from pyverlet.laws.boundaries import Box, Circle, Periodic
 from pyverlet.scenes.gas import henderson
 from pyverlet.world.world import World
 
@@ -35,8 +35,8 @@ def observe(particles: int, seconds: float) -> Kept:
     rng = np.random.default_rng(0)
     size = RADIUS * np.sqrt(particles / AREA_FRACTION)
     angle = rng.uniform(0, 2 * np.pi, particles)
-    room = Circle(radius=size, restitution=1.0)
-    world = circles(in_disc(particles, size, 1.5), room, velocity=SPEED * directions(angle), e=1.0, gravity=(0, 0))
+    boundary = Circle(radius=size, restitution=1.0)
+    world = circles(in_disc(particles, size, 1.5), boundary, velocity=SPEED * directions(angle), e=1.0, gravity=(0, 0))
     before = np.hypot(*world.velocity.T)
     # L is a sum of n terms of either sign and may start near 0, so changes relative to L itself are meaningless. The scale is its
     # standard deviation over random directions, sqrt(sum (m |x| |v|)^2 / 2), the typical L of such a gas.
@@ -77,8 +77,8 @@ def falling(particles: int, seconds: float) -> Result:
     column = int(side / (2.4 * RADIUS))
     k = np.arange(particles)
     place = 2.4 * RADIUS * np.column_stack((k % column + 0.6, k // column + 2.0))
-    room = Box((0, 0), (side, 2 * side), restitution=1.0)
-    world = circles(place, room, velocity=rng.normal(0, 1, (particles, 2)), e=1.0)
+    boundary = Box((0, 0), (side, 2 * side), restitution=1.0)
+    world = circles(place, boundary, velocity=rng.normal(0, 1, (particles, 2)), e=1.0)
     start, above = world.energy().total, float((world.mass * 9.81 * (world.position[:, 1] - RADIUS)).sum())
     worst = max(abs(world.energy().total - start) for _ in frames(world, seconds)) / (world.energy().kinetic + above)
     return Result(
@@ -127,10 +127,10 @@ def periodic_gas(particles: int, fraction: float, *, contacts: bool = False) -> 
     """Elastic circles on a lattice, with total momentum 0."""
     rng, side = np.random.default_rng(1), int(np.ceil(np.sqrt(particles)))
     size = RADIUS * float(np.sqrt(np.pi * particles / fraction))
-    room = Periodic((0, 0), (size, size))
+    boundary = Periodic((0, 0), (size, size))
     velocity = rng.normal(0, PERIODIC_SPEED, (particles, 2))
     place = np.column_stack(np.divmod(np.arange(particles), side)) * (size / side)
-    return circles(place, room, velocity=velocity - velocity.mean(axis=0), e=1.0, gravity=(0, 0), contacts=contacts)
+    return circles(place, boundary, velocity=velocity - velocity.mean(axis=0), e=1.0, gravity=(0, 0), contacts=contacts)
 
 
 def periodic_kept(particles: int, seconds: float, fraction: float, within: float = 1e-4) -> Result:
@@ -157,7 +157,7 @@ def pressure(particles: int, seconds: float, fraction: float, within: float = 0.
         world.step(PRESSURE_FRAME_S)
         if frame >= 0:
             total += world.pressure() / world.energy().kinetic
-    found = total / count * float(np.prod(world.boundary.seam.period))
+    found = total / count * float(np.prod(world.boundary.periodic.period))
     theory = henderson(fraction)
     return Result(
         f"{particles:,} elastic circles in a periodic room: P A / N k T at area fraction {fraction:g} within {100 * within:g} %",

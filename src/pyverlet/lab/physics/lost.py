@@ -2,10 +2,10 @@
 
 import numpy as np
 
-from pyverlet.ground.arrays import Array
+from pyverlet.common.arrays import Array
 from pyverlet.lab.physics._check import DT, RADIUS, Result, circles, directions, fastest, frames
+from pyverlet.laws.boundaries import Boundary, Box, Circle
 from pyverlet.laws.collisions import Collisions
-from pyverlet.laws.rooms import Boundary, Box, Circle
 from pyverlet.world.world import World
 
 SPEEDS = (1, 3, 10, 30, 100, 300, 1000, 3000, 10_000)  # radii per substep

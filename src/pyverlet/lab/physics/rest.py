@@ -5,10 +5,10 @@ from itertools import pairwise
 import numpy as np
 
 from pyverlet import scenes
-from pyverlet.ground.arrays import Array
+from pyverlet.common.arrays import Array
 from pyverlet.lab.physics._check import DT, RADIUS, G, Result, agitation, columns, frames
+from pyverlet.laws.boundaries import Box
 from pyverlet.laws.collisions import Collisions
-from pyverlet.laws.rooms import Box
 from pyverlet.world.world import World
 
 STILL = 1e-4  # kinetic energy per particle over m g R

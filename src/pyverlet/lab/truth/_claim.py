@@ -11,10 +11,10 @@ from typing import Any
 
 import numpy as np
 
-from pyverlet.ground.arrays import Floats
+from pyverlet.common.arrays import Floats
+from pyverlet.laws.boundaries import Boundary, Box, Open
 from pyverlet.laws.integrators import Integrator
-from pyverlet.laws.naive import ClampAndFlip
-from pyverlet.laws.rooms import Boundary, Box, Open
+from pyverlet.laws.textbook import ClampAndFlip
 from pyverlet.world.world import World
 
 

@@ -5,10 +5,10 @@ import numpy as np
 from pyverlet.lab import order
 from pyverlet.lab.problems import FREQUENCY, PROBLEMS, oscillation
 from pyverlet.lab.truth._claim import FLIP, HEIGHT, MINUTE, OPEN, RADIUS, G, H, Number, experiment, path, tops
+from pyverlet.laws.boundaries import Box
 from pyverlet.laws.collisions import Collisions
 from pyverlet.laws.integrators import ExplicitEuler, PositionVerlet, SemiImplicitEuler, TimeCorrectedVerlet
-from pyverlet.laws.naive import ProjectOnly
-from pyverlet.laws.rooms import Box
+from pyverlet.laws.textbook import ProjectOnly
 from pyverlet.world.world import World
 
 OSCILLATOR = PROBLEMS["oscillator"]

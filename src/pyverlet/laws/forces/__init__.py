@@ -1,6 +1,6 @@
 """Forces besides gravity: objects whose `apply(state, t)` adds newtons to `state.force`.
 
-`state` is the engine's working copy (`state.state.Slots`): arrays in the engine's order, with the user's index of each slot in
+`state` is the engine's working copy, a `SortedState`: arrays in the engine's order, with the user's index of each row in
 `state.particle`. A force that depends on velocity sets `velocity_dependent = True`, so that integrators keep their order. A
 conservative force has `potential(state)` in joules, which the world's energy includes. The work of other forces is booked in the
 world's ledger, under `forces` or the name in the force's `account`. Forces between particles within a range derive from

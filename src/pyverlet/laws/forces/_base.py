@@ -7,11 +7,11 @@ from typing import TYPE_CHECKING, Any, NamedTuple, Protocol, TypeGuard, TypeVar,
 import numpy as np
 from numpy.typing import NDArray
 
-from pyverlet.ground.errors import InputError
-from pyverlet.ground.lists import CheckedList
-from pyverlet.ground.shown import listed
+from pyverlet.common.errors import InputError
+from pyverlet.common.lists import CheckedList
+from pyverlet.common.shown import listed
 from pyverlet.state.group import check_home
-from pyverlet.state.slots import Slots
+from pyverlet.state.sorted_state import SortedState
 from pyverlet.state.state import State
 
 
@@ -19,7 +19,7 @@ from pyverlet.state.state import State
 class Force(Protocol):
     """Anything with this method is a force. Without `velocity_dependent` it is assumed to depend on velocity."""
 
-    def apply(self, state: Slots, t: float) -> None:
+    def apply(self, state: SortedState, t: float) -> None:
         """Add this force to `state.force` (n, 2), in N, at time t in s."""
 
 
@@ -129,21 +129,21 @@ class ForceSum:
             flies = state.acceleration.any(axis=1) & np.isfinite(state.mass)
             state.acceleration[flies] += change.astype(state.dtype)
 
-    def __call__(self, state: Slots, t: float) -> None:
+    def __call__(self, state: SortedState, t: float) -> None:
         force = self._summed(state, t)  # acceleration = gravity + force / mass
         about = force, vars(state).get("resistance"), state.inverse_mass
         state.motion.newton(state.acceleration, *about, *self.gravity, state.h)
 
-    def longest_substep(self, state: Slots) -> float:
+    def longest_substep(self, state: SortedState) -> float:
         """The longest substep that all forces with a method of this name allow, s."""
         return min((one.longest_substep(state) for one in self.forces[:] if hasattr(one, "longest_substep")), default=np.inf)
 
-    def look(self, state: Slots, t: float) -> None:
+    def look(self, state: SortedState, t: float) -> None:
         """Evaluate how strong the forces are, without changing accelerations."""
         self._summed(state, t)
         soften(state, self.gravity)
 
-    def _summed(self, state: Slots, t: float) -> NDArray[Any]:
+    def _summed(self, state: SortedState, t: float) -> NDArray[Any]:
         """The sum of all forces without gravity (n, 2), N, not softened; (0, 2) if there are none."""
         forces, drags, force = self.forces[:], [], state.acceleration[:0]
         if forces:
@@ -162,7 +162,7 @@ class ForceSum:
         return force
 
 
-def soften(state: Slots, gravity: tuple[float, float]) -> None:
+def soften(state: SortedState, gravity: tuple[float, float]) -> None:
     """After all forces: soften them where drag is too strong for the substep, see `core/forces.py`."""
     if "resistance" in vars(state):
         state.motion.soften(state.force, state.resistance, state.inverse_mass, *gravity, state.h)

@@ -8,12 +8,12 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from pyverlet.ground import checks
-from pyverlet.ground.checked import Checked
-from pyverlet.ground.errors import InputError
-from pyverlet.ground.shown import Shown
+from pyverlet.common import checks
+from pyverlet.common.checked import Checked
+from pyverlet.common.errors import InputError
+from pyverlet.common.shown import Shown
 from pyverlet.laws.forces._base import Substep
-from pyverlet.state.slots import Slots
+from pyverlet.state.sorted_state import SortedState
 
 Field = Callable[[NDArray[Any], NDArray[Any], float], Any]
 
@@ -47,10 +47,10 @@ class Drag(Shown):
     def __init__(self, *, linear: float = 0.0, quadratic: float = 0.0) -> None:
         self.linear, self.quadratic = linear, quadratic
 
-    def apply(self, state: Slots, t: float) -> None:
+    def apply(self, state: SortedState, t: float) -> None:
         self._add(state, np.zeros((1, 2), state.dtype))
 
-    def _add(self, state: Slots, wind: NDArray[Any]) -> None:
+    def _add(self, state: SortedState, wind: NDArray[Any]) -> None:
         """Add the drag; wind: (n, 2) m/s at each particle, or (1, 2)."""
         state.motion.add_drag(state.force, state.velocity, state.resistance, wind, self.linear, self.quadratic)
 
@@ -74,14 +74,14 @@ class Wind(Drag):
         super().__init__(linear=linear, quadratic=quadratic)
         self.velocity = velocity
 
-    def apply(self, state: Slots, t: float) -> None:
+    def apply(self, state: SortedState, t: float) -> None:
         if callable(self.velocity):
             self._add(state, self._field(self.velocity, state, t))
         else:
             self._add(state, np.array([self.velocity], state.dtype))
 
     @staticmethod
-    def _field(velocity: Field, state: Slots, t: float) -> NDArray[Any]:
+    def _field(velocity: Field, state: SortedState, t: float) -> NDArray[Any]:
         """(n, 2) m/s, the velocity of the medium at each particle."""
         wind = np.empty((len(state), 2), state.dtype)
         x, y = np.ascontiguousarray(state.position.T)
@@ -122,15 +122,15 @@ class Langevin(Shown):
 
     temperature = Checked(checks.number, least=0.0)
     friction = Checked(checks.number, least=0.0)
-    seed = Checked(checks.whole, least=0)
+    seed = Checked(checks.integer, least=0)
 
     def __init__(self, *, temperature: float, friction: float, seed: int = 0) -> None:
         self.temperature, self.friction, self.seed = temperature, friction, seed
 
-    def apply(self, state: Slots, t: float) -> None:
+    def apply(self, state: SortedState, t: float) -> None:
         """Add no force: the bath acts once per substep."""
 
-    def end_substep(self, state: Slots, at: Substep) -> float:
+    def end_substep(self, state: SortedState, at: Substep) -> float:
         """Kick each free particle; returns the energy given, J."""
         keeps = float(np.exp(-self.friction * at.h))
         when, law = ((self.seed + 2**63) % 2**64 - 2**63, at.frame, at.step), (keeps, self.temperature, at.lag)

@@ -7,18 +7,18 @@ from typing import Any
 
 import numpy as np
 
-from pyverlet.ground import checks
-from pyverlet.ground.checked import Checked
-from pyverlet.ground.shown import Shown
+from pyverlet.common import checks
+from pyverlet.common.checked import Checked
+from pyverlet.common.shown import Shown
 from pyverlet.laws.forces._base import swing_time
 from pyverlet.state.group import Group, checked_group, members
-from pyverlet.state.slots import Slots
+from pyverlet.state.sorted_state import SortedState
 from pyverlet.state.state import State
 
 
-def _slots(state: Slots, group: Group | None) -> Any:
-    """Slots of a group's particles, or of all."""
-    return slice(None) if group is None else state.slots_of(members(group))
+def _sorted_rows(state: SortedState, group: Group | None) -> Any:
+    """Rows of a group's particles, or of all."""
+    return slice(None) if group is None else state.sorted_index(members(group))
 
 
 class ConstantForce(Shown):
@@ -39,8 +39,8 @@ class ConstantForce(Shown):
     def __init__(self, newtons: Sequence[float], *, group: Group | None = None) -> None:
         self.newtons, self.group = newtons, group
 
-    def apply(self, state: Slots, t: float) -> None:
-        state.force[_slots(state, self.group)] += np.asarray(self.newtons, state.dtype)
+    def apply(self, state: SortedState, t: float) -> None:
+        state.force[_sorted_rows(state, self.group)] += np.asarray(self.newtons, state.dtype)
 
     def potential(self, state: State) -> float:
         where = members(self.group)
@@ -75,18 +75,20 @@ class PointSpring(Shown):
     def __init__(self, group: Group | None = None, *, center: Sequence[float] = (0.0, 0.0), stiffness: float) -> None:
         self.group, self.center, self.stiffness = group, center, stiffness
 
-    def apply(self, state: Slots, t: float) -> None:
-        where = _slots(state, self.group)
-        state.force[where] -= self.stiffness * state.seam.nearest(state.position[where] - np.asarray(self.center, state.dtype))
+    def apply(self, state: SortedState, t: float) -> None:
+        where = _sorted_rows(state, self.group)
+        state.force[where] -= self.stiffness * state.periodic.nearest(
+            state.position[where] - np.asarray(self.center, state.dtype)
+        )
 
-    def longest_substep(self, state: Slots) -> float:
+    def longest_substep(self, state: SortedState) -> float:
         """The longest allowed substep, s; longer frames are divided."""
-        return TURN * swing_time(self.stiffness * float(state.inverse_mass[_slots(state, self.group)].max(initial=0.0)))
+        return TURN * swing_time(self.stiffness * float(state.inverse_mass[_sorted_rows(state, self.group)].max(initial=0.0)))
 
     def potential(self, state: State) -> float:
         where = members(self.group)
         free = np.isfinite(state.mass[where])
-        offset = state.seam.nearest(state.position[where][free].astype(np.float64) - self.center)
+        offset = state.periodic.nearest(state.position[where][free].astype(np.float64) - self.center)
         return float(0.5 * self.stiffness * np.sum(offset * offset))
 
 
@@ -112,12 +114,12 @@ class Attractor(Shown):
     def __init__(self, *, center: Sequence[float] = (0.0, 0.0), strength: float, softening: float = 0.0) -> None:
         self.center, self.strength, self.softening = center, strength, softening
 
-    def apply(self, state: Slots, t: float) -> None:
-        law = *self.center, self.strength, self.softening, *state.seam.period
+    def apply(self, state: SortedState, t: float) -> None:
+        law = *self.center, self.strength, self.softening, *state.periodic.period
         state.motion.attract(state.force, state.position, state.inverse_mass, *law)
 
     def potential(self, state: State) -> float:
-        distance = np.hypot(*state.seam.nearest(state.position.astype(np.float64) - self.center).T)
+        distance = np.hypot(*state.periodic.nearest(state.position.astype(np.float64) - self.center).T)
         apart = np.hypot(distance, self.softening)
         felt = (apart > 0) & np.isfinite(state.mass)
         return -self.strength * float(np.sum(state.mass[felt] / apart[felt]))

@@ -7,14 +7,14 @@ from typing import Any
 import numpy as np
 
 from pyverlet import core
-from pyverlet.ground import checks
-from pyverlet.ground.arrays import Array
-from pyverlet.ground.checked import Checked
-from pyverlet.ground.shown import Shown
-from pyverlet.laws.rooms import Box, Circle, Periodic
+from pyverlet.common import checks
+from pyverlet.common.arrays import Array
+from pyverlet.common.checked import Checked
+from pyverlet.common.shown import Shown
+from pyverlet.laws.boundaries import Box, Circle, Periodic
 from pyverlet.state.group import Group, checked_group, members
 from pyverlet.state.neighbours import check_range
-from pyverlet.state.slots import Slots
+from pyverlet.state.sorted_state import SortedState
 from pyverlet.state.state import EVERYONE, State
 
 FLUID = 1 << 31
@@ -96,82 +96,82 @@ class Fluid(Shown):
                 own //= 2
             group.category, group.mask = own, EVERYONE & ~own
 
-    def among(self, state: Slots | State) -> Array:
-        """Slots of particles whose mutual forces sum to zero."""
-        who = np.arange(len(state))[members(self.group)]
-        return np.asarray(state.slots_of(who) if isinstance(state, Slots) else who, np.int32)
+    def among(self, state: SortedState | State) -> Array:
+        """Rows of particles whose mutual forces sum to zero."""
+        which = np.arange(len(state))[members(self.group)]
+        return np.asarray(state.sorted_index(which) if isinstance(state, SortedState) else which, np.int32)
 
-    def apply(self, state: Slots, t: float) -> None:
-        who = self._members(state)[0]
-        if len(state.calm):
-            state.calm[who] = 0
+    def apply(self, state: SortedState, t: float) -> None:
+        which = self._members(state)[0]
+        if len(state.sleep_timer):
+            state.sleep_timer[which] = 0
         self.density, self.pressure = self._flow(state, state.force, (self.stiffness, self.viscosity))
         self.pressure *= MEASURED
 
-    def dissipate(self, state: Slots, t: float) -> None:
+    def dissipate(self, state: SortedState, t: float) -> None:
         """As `apply`, with the viscous forces alone."""
         self._flow(state, state.force, (0.0, self.viscosity))
 
-    def potential(self, state: Slots | State) -> float:
+    def potential(self, state: SortedState | State) -> float:
         density, law = self._flow(state, None, (0.0, 0.0))[0], (self.rest_density, self.stiffness)
         if density is not self._held[0] or law != self._held[1]:  # a frame begins where the last one ended
             mass = self._members(state)[1]
             self._held = density, law, float(core.unit("motion", mass.dtype).energy_of_fluid(density, mass, *law))
         return float(self._held[2])
 
-    def _flow(self, state: Slots | State, force: Array | None, law: tuple[float, float]) -> tuple[Array, Array]:
+    def _flow(self, state: SortedState | State, force: Array | None, law: tuple[float, float]) -> tuple[Array, Array]:
         """Add to `force`, unless it is None; returns densities and pressures (n,), NaN for particles that are not fluid."""
-        who, mass, pinned, spacing, discs = self._members(state)
-        density, pressure = whole = found = np.empty((2, len(who)))
+        which, mass, pinned, spacing, discs = self._members(state)
+        density, pressure = whole = found = np.empty((2, len(which)))
         motion, flows, reach = core.unit("motion", state.dtype), None, SUPPORT * spacing
         if pinned or not motion.all_finite(state.position, state.position):
-            flows = np.isfinite(mass) & np.isfinite(state.position[who]).all(axis=1)
+            flows = np.isfinite(mass) & np.isfinite(state.position[which]).all(axis=1)
             whole.fill(np.nan)
-            who, mass, found = who[flows], mass[flows], np.empty((2, np.count_nonzero(flows)))
+            which, mass, found = which[flows], mass[flows], np.empty((2, np.count_nonzero(flows)))
             discs = discs[np.isfinite(state.position[discs]).all(axis=1)]
-        if not len(who):
+        if not len(which):
             return density, pressure
-        check_range(reach, state.seam)
+        check_range(reach, state.periodic)
         about = state.position[discs], state.radius[discs], np.zeros((len(discs), 2)), state.velocity[discs], discs
-        mirrors = np.concatenate((_walls(state.room), np.column_stack(about)))
-        given = mass, mirrors[:, :5], np.array([reach, *state.seam])
+        mirrors = np.concatenate((_walls(state.boundary), np.column_stack(about)))
+        given = mass, mirrors[:, :5], np.array([reach, *state.periodic])
         if force is None and self._last:  # where the last frame ended
             *before, place, there, known = self._last
             here = state.position
-            if who is not there:
-                here, place = here.take(who, axis=0), place.take(there, axis=0)
+            if which is not there:
+                here, place = here.take(which, axis=0), place.take(there, axis=0)
             if all(map(np.array_equal, (*given, here), (*before, place))):
                 return known, pressure
         motion.flow_of_fluid(
-            force, state.position, state.velocity, mass, who, mirrors, state.seam, reach, self.rest_density, *law,
+            force, state.position, state.velocity, mass, which, mirrors, state.periodic, reach, self.rest_density, *law,
             *getattr(state, "thread_team", (0, 1)), *found, self._work,
         )  # fmt: skip
         if found is not whole:
             density[flows], pressure[flows] = found
-        self._last = *given, state.position.copy(), who, density
+        self._last = *given, state.position.copy(), which, density
         return density, pressure
 
-    def _members(self, state: Slots | State) -> tuple[Array, Array, bool, float, Array]:
-        """Slots, masses, whether some are pinned, the spacing; in the user's order slots of particles that are mirrors: see
+    def _members(self, state: SortedState | State) -> tuple[Array, Array, bool, float, Array]:
+        """Rows, masses, whether some are pinned, the spacing; in the user's order rows of particles that are mirrors: see
         `core.fluid_images`. Constant within a frame.
         """
         given = getattr(state, "particle", None), getattr(state, "revision", None), self.group, self.rest_density
         if given[0] is None or given[0] is not self._known[0] or given[1:] != self._known[1]:
-            who = self.among(state)
-            mass = state.mass.take(who)
+            which = self.among(state)
+            mass = state.mass.take(which)
             flows = np.isfinite(mass)
             spacing = float(np.sqrt(mass[flows].sum(dtype=float) / max(np.count_nonzero(flows), 1) / self.rest_density))
             large = state.radius >= MIRRORED * spacing
-            if large.any() and len(who):
-                large[who] = False
+            if large.any() and len(which):
+                large[which] = False
                 if len(state.category):
-                    large &= (state.category & state.mask[who[0]] > 0) & (state.mask & state.category[who[0]] > 0)
+                    large &= (state.category & state.mask[which[0]] > 0) & (state.mask & state.category[which[0]] > 0)
             discs = np.flatnonzero(large)
             discs = discs if given[0] is None else discs[np.argsort(given[0][discs])]
-            self._known = given[0], given[1:], who, mass, not flows.all(), spacing, discs
+            self._known = given[0], given[1:], which, mass, not flows.all(), spacing, discs
         return self._known[2:]
 
-    def longest_substep(self, state: Slots) -> float:
+    def longest_substep(self, state: SortedState) -> float:
         """The longest substep by stiffness and viscosity, s; longer frames are divided."""
         spacing = self._members(state)[3]
         if spacing == 0.0:  # no fluid particle is left
@@ -183,10 +183,10 @@ class Fluid(Shown):
         return vars(self) | {"_last": (), "_held": (None, None, 0.0), "_work": []}
 
 
-def _walls(room: Any) -> Array:
+def _walls(boundary: Any) -> Array:
     """(w, 8) mirrors of a room's walls for `core.fluid_images`."""
-    walls = [(*room.center, -room.radius, 0, 0)] if isinstance(room, Circle) else []
-    if isinstance(room, Box | Periodic):
-        sides = (*room.lower, 0, 1, 0), (*room.upper, 0, -1, 0), (*room.lower, 0, 0, 1), (*room.upper, 0, 0, -1)
-        walls = [side for side, axis in zip(sides, "xxyy", strict=True) if axis not in getattr(room, "axes", "")]
+    walls = [(*boundary.center, -boundary.radius, 0, 0)] if isinstance(boundary, Circle) else []
+    if isinstance(boundary, Box | Periodic):
+        sides = (*boundary.lower, 0, 1, 0), (*boundary.upper, 0, -1, 0), (*boundary.lower, 0, 0, 1), (*boundary.upper, 0, 0, -1)
+        walls = [side for side, axis in zip(sides, "xxyy", strict=True) if axis not in getattr(boundary, "axes", "")]
     return np.array([(*wall, 0, 0, -1) for wall in walls], float).reshape(-1, 8)

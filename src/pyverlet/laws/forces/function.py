@@ -10,11 +10,11 @@ from typing import Any, NoReturn, overload
 
 import numpy as np
 
-from pyverlet.ground import pickling
-from pyverlet.ground.arrays import Array
-from pyverlet.ground.errors import InputError, NonFiniteError
+from pyverlet.common import pickling
+from pyverlet.common.arrays import Array
+from pyverlet.common.errors import InputError, NonFiniteError
 from pyverlet.laws.forces import native
-from pyverlet.state.slots import Slots
+from pyverlet.state.sorted_state import SortedState
 from pyverlet.state.state import State
 
 Function = Callable[[float, float, float, float, float, float], tuple[float, float]]
@@ -181,21 +181,29 @@ class FunctionForce:
     def __copy__(self) -> FunctionForce:
         return self
 
-    def apply(self, state: Slots, t: float) -> None:
+    def apply(self, state: SortedState, t: float) -> None:
         """Add the function's value for every free particle.
 
         Raises:
             InputError: it returns something other than two numbers.
             NonFiniteError: it returned NaN or infinity.
         """
-        if self._code.add(state, state.seam.wrapped(state.position), float(t)):
+        if self._code.add(state, state.periodic.wrapped(state.position), float(t)):
             self._blame(state, t)
 
-    def _blame(self, state: Slots, t: float) -> None:
+    def _blame(self, state: SortedState, t: float) -> None:
         """Find the first particle for which it fails, and raise the error."""
         for particle in range(len(state)):
-            slot = int(state.slots_of(particle))
-            given = [float(v) for v in (*state.seam.wrapped(state.position)[slot], *state.velocity[slot], state.mass[slot], t)]
+            sorted_index = int(state.sorted_index(particle))
+            given = [
+                float(v)
+                for v in (
+                    *state.periodic.wrapped(state.position)[sorted_index],
+                    *state.velocity[sorted_index],
+                    state.mass[sorted_index],
+                    t,
+                )
+            ]
             try:
                 value = tuple(map(float, self._code.call(*given)))
             except Exception as error:  # any exception of the user's code

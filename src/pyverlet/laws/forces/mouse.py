@@ -8,10 +8,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from pyverlet.ground import checks
-from pyverlet.ground.checked import Checked
-from pyverlet.ground.shown import Shown
-from pyverlet.state.slots import Slots
+from pyverlet.common import checks
+from pyverlet.common.checked import Checked
+from pyverlet.common.shown import Shown
+from pyverlet.state.sorted_state import SortedState
 
 
 class Grip(Shown):
@@ -28,7 +28,7 @@ class Grip(Shown):
 
     velocity_dependent = True
 
-    particle = Checked(checks.whole, least=0)
+    particle = Checked(checks.integer, least=0)
     target = Checked(checks.vector)
     frequency = Checked(checks.number, above=0.0)
     strength = Checked(checks.number, above=0.0)
@@ -36,17 +36,17 @@ class Grip(Shown):
     def __init__(self, particle: int, *, target: Sequence[float], frequency: float = 5.0, strength: float = 1.0) -> None:
         self.particle, self.target, self.frequency, self.strength = particle, target, frequency, strength
 
-    def apply(self, state: Slots, t: float) -> None:
+    def apply(self, state: SortedState, t: float) -> None:
         if self.particle < 0:
             return
-        slot = state.slots_of(checks.whole("particle of a Grip", self.particle, least=0, most=len(state) - 1))
-        mass = state.mass[slot]
+        sorted_index = state.sorted_index(checks.integer("particle of a Grip", self.particle, least=0, most=len(state) - 1))
+        mass = state.mass[sorted_index]
         if not np.isfinite(mass):
             return
         w = 2.0 * np.pi * self.frequency
-        reach = state.seam.nearest(np.asarray(self.target, state.dtype) - state.position[slot])
-        pull = reach * (self.strength * w**2) - 2.0 * w * state.velocity[slot]
-        state.force[slot] += mass * pull
+        reach = state.periodic.nearest(np.asarray(self.target, state.dtype) - state.position[sorted_index])
+        pull = reach * (self.strength * w**2) - 2.0 * w * state.velocity[sorted_index]
+        state.force[sorted_index] += mass * pull
 
     def renumber(self, now: NDArray[Any]) -> None:
         """Keep the particle after others were removed, or none (`particle` is -1) if it was removed itself."""
@@ -74,8 +74,8 @@ class Push(Shown):
     def __init__(self, *, center: Sequence[float], radius: float, acceleration: float) -> None:
         self.center, self.radius, self.acceleration = center, radius, acceleration
 
-    def apply(self, state: Slots, t: float) -> None:
-        offset = state.seam.nearest(state.position - np.asarray(self.center, state.dtype))
+    def apply(self, state: SortedState, t: float) -> None:
+        offset = state.periodic.nearest(state.position - np.asarray(self.center, state.dtype))
         distance = np.hypot(offset[:, 0], offset[:, 1])
         near = np.flatnonzero((distance < self.radius) & (distance > 0) & np.isfinite(state.mass))
         strength = self.acceleration * state.mass[near] * (1 / distance[near] - 1 / self.radius)

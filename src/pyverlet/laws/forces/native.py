@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 
-from pyverlet.ground.arrays import Array
+from pyverlet.common.arrays import Array
 
 _BUILTINS = {"abs", "bool", "float", "int", "max", "min", "pow", "range", "round"}
 

@@ -10,14 +10,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from pyverlet.ground import checks
-from pyverlet.ground.arrays import Array
-from pyverlet.ground.checked import Checked
-from pyverlet.ground.errors import InputError, NonFiniteError
-from pyverlet.ground.shown import Shown
+from pyverlet.common import checks
+from pyverlet.common.arrays import Array
+from pyverlet.common.checked import Checked
+from pyverlet.common.errors import InputError, NonFiniteError
+from pyverlet.common.shown import Shown
 from pyverlet.laws.forces.function import Code, FunctionForce
 from pyverlet.state.neighbours import Near, check_range, near
-from pyverlet.state.slots import Slots
+from pyverlet.state.sorted_state import SortedState
 from pyverlet.state.state import State
 
 Indices = NDArray[np.int32]
@@ -34,7 +34,7 @@ class PairForce(Shown, ABC):
 
     velocity_dependent = False
     symmetric = True  # if False, `force` is the force on i, and is also called with (j, i)
-    looks_at_particles = True  # whether i and j matter; if False they may be slots, which is faster
+    looks_at_particles = True  # whether i and j matter; if False they may be rows, which is faster
     parts_all = False  # whether it is finite at distance 0, too; then it acts along x, with the lower of i and j on the left
     range: float
 
@@ -42,11 +42,11 @@ class PairForce(Shown, ABC):
     def force(self, distance: Array, i: Indices, j: Indices) -> Array:
         """(k,) N for k pairs of the user's particles i and j, (k,) each, at `distance` (k,) m; positive is repulsive."""
 
-    def among(self, state: Slots) -> Array:
-        """Slots of particles whose mutual forces sum to zero."""
+    def among(self, state: SortedState) -> Array:
+        """Rows of particles whose mutual forces sum to zero."""
         return np.arange(len(state))
 
-    def apply(self, state: Slots, t: float) -> None:
+    def apply(self, state: SortedState, t: float) -> None:
         """Add the forces on both particles of each pair.
 
         Raises:
@@ -54,14 +54,14 @@ class PairForce(Shown, ABC):
         """
         pairs = state.near(self.range, together=self.parts_all)
         if len(pairs.i):
-            who = (state.particle[pairs.i], state.particle[pairs.j]) if self.looks_at_particles else (pairs.i, pairs.j)
-            on_i, on_j = self._both(pairs.distance, *who)
+            which = (state.particle[pairs.i], state.particle[pairs.j]) if self.looks_at_particles else (pairs.i, pairs.j)
+            on_i, on_j = self._both(pairs.distance, *which)
             most = max(on_i.max(), -on_i.min(), on_j.max(), -on_j.min())
             if not most * float(state.inverse_mass.max()) * state.h**2 <= self.range:
                 self._refuse_throws(state, pairs, on_i, on_j)
             state.motion.add_along(state.force, pairs.i, pairs.j, pairs.way, on_i, on_j)
 
-    def _refuse_throws(self, state: Slots, pairs: Near, on_i: Array, on_j: Array) -> None:
+    def _refuse_throws(self, state: SortedState, pairs: Near, on_i: Array, on_j: Array) -> None:
         """Raise InputError if a force throws a pair farther apart in a substep than its range."""
         ease = state.inverse_mass.astype(float)
         way = state.h**2 * np.maximum(abs(on_i) * ease[pairs.i], abs(on_j) * ease[pairs.j])
@@ -92,7 +92,7 @@ class PairForce(Shown, ABC):
 
     def _felt(self, state: State) -> tuple[Array, Indices, Indices]:
         """distance, i, j of the current pairs that are not both pinned."""
-        found = near(state.position, check_range(self.range, state.seam), state.seam, together=self.parts_all)
+        found = near(state.position, check_range(self.range, state.periodic), state.periodic, together=self.parts_all)
         free = np.isfinite(state.mass)
         felt = free[found.i] | free[found.j]
         return found.distance[felt], found.i[felt], found.j[felt]
@@ -136,7 +136,7 @@ class PairFunctionForce(PairForce, FunctionForce):
     def __repr__(self) -> str:
         return self._code.name
 
-    def apply(self, state: Slots, t: float) -> None:
+    def apply(self, state: SortedState, t: float) -> None:
         self._t = t
         super().apply(state, t)
 

@@ -7,16 +7,16 @@ from typing import Any
 
 import numpy as np
 
+from pyverlet.common import checks
+from pyverlet.common.arrays import Array
+from pyverlet.common.checked import Checked
+from pyverlet.common.errors import InputError
+from pyverlet.common.shown import Shown
 from pyverlet.core import unit
-from pyverlet.ground import checks
-from pyverlet.ground.arrays import Array
-from pyverlet.ground.checked import Checked
-from pyverlet.ground.errors import InputError
-from pyverlet.ground.shown import Shown
 from pyverlet.laws.forces._base import Substep, swing_time
 from pyverlet.laws.forces.pair import PairLaw
 from pyverlet.state.group import Group, checked_group, members
-from pyverlet.state.slots import Slots
+from pyverlet.state.sorted_state import SortedState
 from pyverlet.state.state import State
 
 _TOUCH = 1e-3
@@ -72,7 +72,7 @@ class LennardJones(PairLaw):
         sixth, last = self._sixth(distance), self._sixth(self.cutoff)
         return np.asarray(4.0 * self.epsilon * (sixth * (sixth - 1.0) - last * (last - 1.0)))
 
-    def longest_substep(self, state: Slots) -> float:
+    def longest_substep(self, state: SortedState) -> float:
         """The longest allowed substep, s; longer frames are divided."""
         return SWING * self.sigma * swing_time(self.epsilon * float(state.inverse_mass.max(initial=0.0)))
 
@@ -138,7 +138,7 @@ class SoftRepulsion(PairLaw):
     def energy(self, distance: Array, i: Array, j: Array) -> Array:
         return np.asarray(0.5 * self.strength * self.range * (1.0 - distance / self.range) ** 2)
 
-    def longest_substep(self, state: Slots) -> float:
+    def longest_substep(self, state: SortedState) -> float:
         """The longest allowed substep, s; longer frames are divided."""
         return SOFT_SWING * swing_time(abs(self.strength) / self.range * float(state.inverse_mass.max(initial=0.0)))
 
@@ -172,11 +172,11 @@ class Cohesion(Shown):
         self.strength, self.break_distance = strength, break_distance
         self.bonds = np.zeros((0, 2), np.int64)
 
-    def among(self, state: Slots) -> Array:
-        """Slots of particles whose mutual forces sum to zero."""
-        return np.asarray(np.unique(state.slots_of(self.bonds)))
+    def among(self, state: SortedState) -> Array:
+        """Rows of particles whose mutual forces sum to zero."""
+        return np.asarray(np.unique(state.sorted_index(self.bonds)))
 
-    def _look_at(self, state: State | Slots) -> None:
+    def _look_at(self, state: State | SortedState) -> None:
         """Use the bonds for this world from now on.
 
         Raises:
@@ -186,9 +186,9 @@ class Cohesion(Shown):
             raise InputError(f"{self!r} holds the bonds of another world; allowed is an object of its own for each world")
         self._world = state.key
 
-    def apply(self, state: Slots, t: float) -> None:
+    def apply(self, state: SortedState, t: float) -> None:
         self._look_at(state)
-        i, j = np.ascontiguousarray(state.slots_of(self.bonds).T)
+        i, j = np.ascontiguousarray(state.sorted_index(self.bonds).T)
         if len(i):
             gap, way = self._gaps(state, i, j)
             pull = -self.strength * (1.0 - gap.clip(0.0, self.break_distance) / self.break_distance)
@@ -199,7 +199,7 @@ class Cohesion(Shown):
         gap = self._gaps(state, *self.bonds.T)[0]
         return float(self._energy(gap[np.isfinite(state.mass[self.bonds]).any(axis=1)]).sum())
 
-    def end_substep(self, state: Slots, at: Substep) -> float:
+    def end_substep(self, state: SortedState, at: Substep) -> float:
         """Add bonds of touching circles and remove broken ones; returns the change of energy, J."""
         if not len(state):
             return 0.0
@@ -207,11 +207,11 @@ class Cohesion(Shown):
         touch = found.distance <= (state.radius[found.i].astype(float) + state.radius[found.j]) * (1.0 + _TOUCH)
         count, pairs = len(state), np.sort(state.particle[np.column_stack((found.i, found.j))[touch]], axis=1).astype(np.int64)
         keys, held = pairs @ np.array([count, 1]), self.bonds @ np.array([count, 1])
-        new, far = np.setdiff1d(keys, held), self._gaps(state, *state.slots_of(self.bonds).T)[0] >= self.break_distance
+        new, far = np.setdiff1d(keys, held), self._gaps(state, *state.sorted_index(self.bonds).T)[0] >= self.break_distance
         if not len(new) and not far.any():
             return 0.0
         self.bonds = np.column_stack(np.divmod(np.union1d(held[~far], new), count))
-        made = state.slots_of(np.column_stack(np.divmod(new, count)))
+        made = state.sorted_index(np.column_stack(np.divmod(new, count)))
         free = (state.inverse_mass[made] > 0).any(axis=1)
         return float(self._energy(self._gaps(state, *made.T)[0][free]).sum())
 
@@ -219,7 +219,7 @@ class Cohesion(Shown):
         """Sum over bonds of force times distance, J."""
         self._look_at(state)
         gap = self._gaps(state, *self.bonds.T)[0].clip(0.0, self.break_distance)
-        distance = np.hypot(*state.seam.nearest(np.diff(state.position[self.bonds].astype(float), axis=1)[:, 0]).T)
+        distance = np.hypot(*state.periodic.nearest(np.diff(state.position[self.bonds].astype(float), axis=1)[:, 0]).T)
         return float(-self.strength * ((1.0 - gap / self.break_distance) * distance).sum())
 
     def _energy(self, gap: Array) -> Array:
@@ -230,7 +230,7 @@ class Cohesion(Shown):
     @staticmethod
     def _gaps(state: Any, i: Array, j: Array) -> tuple[Array, Array]:
         """Gaps between the rims, m, and unit vectors from i to j."""
-        way = state.seam.nearest(state.position[j].astype(float) - state.position[i])
+        way = state.periodic.nearest(state.position[j].astype(float) - state.position[i])
         distance = np.hypot(*way.T)
         gap = distance - state.radius[i] - state.radius[j]
         return gap, np.divide(way, distance[:, None], out=np.zeros_like(way), where=distance[:, None] > 0)
@@ -283,27 +283,27 @@ class Gravitation(Shown):
         self._pull: Any = None
         self._work: list[Array] = []
 
-    def among(self, state: Slots) -> Array:
-        """Slots of particles whose mutual forces sum to zero."""
-        return np.asarray(state.slots_of(np.arange(len(state))[members(self.group)]))
+    def among(self, state: SortedState) -> Array:
+        """Rows of particles whose mutual forces sum to zero."""
+        return np.asarray(state.sorted_index(np.arange(len(state))[members(self.group)]))
 
-    def _law(self, count: int, state: Slots | State) -> tuple[float, float, float]:
-        return self.strength, self.softening, 0.0 if count <= FEW or state.seam else self.theta
+    def _law(self, count: int, state: SortedState | State) -> tuple[float, float, float]:
+        return self.strength, self.softening, 0.0 if count <= FEW or state.periodic else self.theta
 
-    def apply(self, state: Slots, t: float) -> None:
-        who = self.among(state)
-        law = self._law(len(who), state)
-        given = state.position, state.mass, who, np.array((*law, *state.seam))
+    def apply(self, state: SortedState, t: float) -> None:
+        which = self.among(state)
+        law = self._law(len(which), state)
+        given = state.position, state.mass, which, np.array((*law, *state.periodic))
         if not (self._last and all(map(np.array_equal, given, self._last))):  # a frame begins where the last one ended
             self._last, self._pull = tuple(map(np.copy, given)), np.zeros_like(state.force)
-            state.motion.gravitate(self._pull, *given[:3], *law, state.seam, *state.thread_team, self._work, False)
+            state.motion.gravitate(self._pull, *given[:3], *law, state.periodic, *state.thread_team, self._work, False)
         state.force += self._pull
 
     def potential(self, state: State) -> float:
         where = members(self.group)
         position, mass = state.position[where].astype(np.float64), state.mass[where].astype(np.float64)
         given = np.zeros_like(position), position, mass, np.arange(len(mass), dtype=np.int32)
-        return float(unit("motion", np.float64).gravitate(*given, *self._law(len(mass), state), state.seam, 0, 1))
+        return float(unit("motion", np.float64).gravitate(*given, *self._law(len(mass), state), state.periodic, 0, 1))
 
     def __getstate__(self) -> dict[str, Any]:
         return vars(self) | {"_last": (), "_pull": None, "_work": []}

@@ -6,8 +6,8 @@ from typing import Any
 
 import numpy as np
 
-from pyverlet.ground.arrays import Indices
-from pyverlet.ground.errors import InputError
+from pyverlet.common.arrays import Indices
+from pyverlet.common.errors import InputError
 from pyverlet.state.group import Group
 from pyverlet.state.state import State
 

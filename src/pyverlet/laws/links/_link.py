@@ -11,11 +11,11 @@ from typing import TYPE_CHECKING, Any, ClassVar
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from pyverlet.ground import checks
-from pyverlet.ground.arrays import Array, Floats
-from pyverlet.ground.errors import InputError
+from pyverlet.common import checks
+from pyverlet.common.arrays import Array, Floats
+from pyverlet.common.errors import InputError
 from pyverlet.state.group import Group
-from pyverlet.state.seam import Seam
+from pyverlet.state.periodicity import Periodicity
 from pyverlet.state.state import State
 
 if TYPE_CHECKING:
@@ -65,14 +65,14 @@ class Numbers:
         vars(link)[name] = numbers
         if link._pool is not None:
             try:
-                link._check(link._state.seam)
+                link._check(link._state.periodic)
             except InputError:
                 vars(link)[name] = before
                 raise
             link._change(link._columns[self._kept], numbers)
 
 
-class _InTurn(ABCMeta):
+class _Exclusive(ABCMeta):
     """Metaclass that creates links under a lock: no thread removes particles between looking them up and storing numbers."""
 
     @property
@@ -84,11 +84,11 @@ class _InTurn(ABCMeta):
     def __call__(cls, *ends: Any, **options: Any) -> Any:
         groups = (part for end in ends for part in (end if isinstance(end, tuple) else (end,)) if isinstance(part, Group))
         group = next(groups, None)
-        with group._state.turn if group is not None else nullcontext():
+        with group._state.lock if group is not None else nullcontext():
             return super().__call__(*ends, **options)
 
 
-class Link(metaclass=_InTurn):
+class Link(metaclass=_Exclusive):
     """One or more links of a kind, added to a world by `world.links.append`.
 
     Attributes:
@@ -170,7 +170,7 @@ class Link(metaclass=_InTurn):
             raise InputError(f"{self!r} joins, in its row {row}, a particle that was removed; allowed are those of the world")
         self.particles = where
 
-    def _check(self, seam: Seam) -> None:
+    def _check(self, periodic: Periodicity) -> None:
         """Raise InputError if these do not fit into a room with this periodicity."""
 
     @property

@@ -6,10 +6,10 @@ from typing import Any
 
 import numpy as np
 
-from pyverlet.ground import memory
-from pyverlet.ground.arrays import Array
+from pyverlet.common import memory
+from pyverlet.common.arrays import Array
 from pyverlet.laws.links._link import CHANGED, REMEMBERED
-from pyverlet.state.seam import Seam
+from pyverlet.state.periodicity import Periodicity
 
 NEVER = 1e300
 """Next value of a row that has not been solved yet."""
@@ -47,7 +47,7 @@ class Pool:
     """
 
     def __init__(self) -> None:
-        self.rows = self._room = {name: np.empty((0, *shape), dtype) for name, (dtype, shape) in _COLUMNS.items()}
+        self.rows = self._buffers = {name: np.empty((0, *shape), dtype) for name, (dtype, shape) in _COLUMNS.items()}
         self.particle = np.empty(0, np.int64)
         self.edits = 0
         self.live: list[tuple[Array, Array]] = []
@@ -61,17 +61,19 @@ class Pool:
         """Add a row for each of the (k, p) particles, the user's indices; values have an entry for each row, or one for all."""
         known, (count, arity) = len(self), particles.shape
         self.particle = memory.extended(self.particle, particles.ravel())
-        if known + count > len(self._room["owner"]):  # doubling: adding one by one costs O(1) each on average
-            self._room = {name: np.resize(column, (2 * known + count, *column.shape[1:])) for name, column in self.rows.items()}
+        if known + count > len(self._buffers["owner"]):  # doubling: adding one by one costs O(1) each on average
+            self._buffers = {
+                name: np.resize(column, (2 * known + count, *column.shape[1:])) for name, column in self.rows.items()
+            }
         for name, value in (_NEW | values | {"owner": owner, "arity": arity}).items():
-            self._room[name][known : known + count] = value
-        self._edit({name: column[: known + count] for name, column in self._room.items()})
+            self._buffers[name][known : known + count] = value
+        self._edit({name: column[: known + count] for name, column in self._buffers.items()})
 
     def keep(self, mask: Array) -> None:
         """Keep these rows and remove all others."""
         self.particle = self.particle[np.repeat(mask, self.rows["arity"])]
-        self._room = {name: column[mask] for name, column in self.rows.items()}
-        self._edit(self._room)
+        self._buffers = {name: column[mask] for name, column in self.rows.items()}
+        self._edit(self._buffers)
 
     def save(self) -> tuple[dict[str, Array], Array]:
         """A copy of all rows, and of their particles."""
@@ -79,8 +81,8 @@ class Pool:
 
     def restore(self, rows: dict[str, Array], particle: Array) -> None:
         """Set the rows that `save` returned."""
-        self._room, self.particle = {name: column.copy() for name, column in rows.items()}, particle.copy()
-        self._edit(self._room)
+        self._buffers, self.particle = {name: column.copy() for name, column in rows.items()}, particle.copy()
+        self._edit(self._buffers)
 
     def _edit(self, rows: dict[str, Array]) -> None:
         self.rows, self.live = rows, []
@@ -134,24 +136,24 @@ class Pool:
 
     # ---- what it measures: positions are (n, 2) m, in the user's order -------------------------------------------------
 
-    def values(self, position: Array, seam: Seam) -> Array:
+    def values(self, position: Array, periodic: Periodicity) -> Array:
         """(k,) value C of each row, relative to rest."""
         kind, first = self.rows["kind"], self.first
-        value = self._bent(position, seam)[0]
+        value = self._bent(position, periodic)[0]
         row = np.flatnonzero(kind == DISTANCE)
         start, end = (position[self.particle[first[row] + side]] for side in (0, 1))
-        value[row] = np.hypot(*seam.nearest(end.astype(float) - start).T) - self.rows["rest"][row]
+        value[row] = np.hypot(*periodic.nearest(end.astype(float) - start).T) - self.rows["rest"][row]
         row = np.flatnonzero(kind == PIN)
         away = position[self.particle[first[row]]].astype(float) - self.rows["point"][row]
-        value[row] = np.hypot(*seam.nearest(away).T)
+        value[row] = np.hypot(*periodic.nearest(away).T)
         return value
 
-    def gradients(self, position: Array, seam: Seam) -> Array:
+    def gradients(self, position: Array, periodic: Periodicity) -> Array:
         """(entries,) |grad C|^2; 1 for distances and pins."""
         straight = np.repeat(np.isin(self.rows["kind"], (DISTANCE, PIN)), self.rows["arity"])
-        return np.where(straight, 1.0, (self._bent(position, seam)[1] ** 2).sum(axis=1))
+        return np.where(straight, 1.0, (self._bent(position, periodic)[1] ** 2).sum(axis=1))
 
-    def _bent(self, position: Array, seam: Seam) -> tuple[Array, Array]:
+    def _bent(self, position: Array, periodic: Periodicity) -> tuple[Array, Array]:
         """(k,) C of angles and areas, and (entries, 2) its gradients; 0 for others."""
         kind, rest, first = self.rows["kind"], self.rows["rest"], self.first
         value, gradient = np.zeros(len(kind)), np.zeros((len(self.particle), 2))
@@ -160,7 +162,7 @@ class Pool:
         corner = position[self.particle].astype(np.float64)
         if (angles := np.flatnonzero(kind == ANGLE)).size:
             e = first[angles]
-            a, b = seam.nearest(corner[e] - corner[e + 1]), seam.nearest(corner[e + 2] - corner[e + 1])
+            a, b = periodic.nearest(corner[e] - corner[e + 1]), periodic.nearest(corner[e + 2] - corner[e + 1])
             turn = np.arctan2(cross(a, b), (a * b).sum(axis=1)) - rest[angles]
             value[angles] = turn - TURN * np.floor(turn / TURN + 0.5)
             gradient[e] = across(a) / np.maximum((a * a).sum(axis=1), 1e-300)[:, None]
@@ -168,7 +170,7 @@ class Pool:
             gradient[e + 1] = -gradient[e] - gradient[e + 2]
         for row in np.flatnonzero(kind == AREA):
             here = slice(first[row], first[row + 1])
-            way = seam.nearest(corner[here] - corner[first[row]])  # triangles at the first particle
+            way = periodic.nearest(corner[here] - corner[first[row]])  # triangles at the first particle
             after, before = np.roll(way, -1, axis=0), np.roll(way, 1, axis=0)
             value[row] = 0.5 * cross(way, after).sum() - rest[row]
             gradient[here] = 0.5 * across(after - before)
@@ -180,49 +182,49 @@ class Pool:
         known = [family for family in (distance, ~(distance | pin), pin) if family.any()]
         return sorted(known, key=np.argmax) if len(known) > 1 else [slice(None)] * len(known)
 
-    def energies(self, position: Array, seam: Seam) -> Array:
+    def energies(self, position: Array, periodic: Periodicity) -> Array:
         """(k,) energy stored in each row, J: 0 for rigid and broken rows, and slack ropes."""
-        stiffness, value, intact = self.rows["stiffness"], self.values(position, seam), self.rows["intact"].copy()
+        stiffness, value, intact = self.rows["stiffness"], self.values(position, periodic), self.rows["intact"].copy()
         for rows, now in self.live:
             intact[rows] = now
         pulled = np.isfinite(stiffness) & (intact != 0) & ~((self.rows["upper"] <= 0.0) & (value < 0.0))
         return np.asarray(0.5 * np.where(pulled, stiffness, 0.0) * value * value)
 
-    def energy(self, position: Array, seam: Seam) -> float:
+    def energy(self, position: Array, periodic: Periodicity) -> float:
         """Energy stored in soft links, J."""
-        return self._summed(self.energies(position, seam)) if self.gives else 0.0
+        return self._summed(self.energies(position, periodic)) if self.gives else 0.0
 
     def _summed(self, energies: Array) -> float:
         return sum(float(energies[rows].sum()) for rows in self._families())
 
-    def energy_by_pull(self, position: Array, seam: Seam) -> float:
+    def energy_by_pull(self, position: Array, periodic: Periodicity) -> float:
         """As `energy`, but at most F^2 / 2 k for rows whose value is mostly rounding."""
         rows = self.rows
         if not self.gives:
             return 0.0
-        energies, soft = self.energies(position, seam), np.isfinite(rows["stiffness"]) & (rows["stiffness"] > 0)
+        energies, soft = self.energies(position, periodic), np.isfinite(rows["stiffness"]) & (rows["stiffness"] > 0)
         stiffness = np.where(soft, rows["stiffness"], 1.0)
         size = np.abs(position[self.particle]).max(axis=1, initial=0.0).astype(float)
         coarse = float(np.finfo(position.dtype).eps) * np.maximum.reduceat(size, self.first[:-1])
-        coarse *= np.sqrt(np.maximum.reduceat(self.gradients(position, seam), self.first[:-1]))
+        coarse *= np.sqrt(np.maximum.reduceat(self.gradients(position, periodic), self.first[:-1]))
         most = 0.5 * stiffness * (UNSURE * coarse) ** 2
         hidden = (rows["intact"] != 0) & (energies < most) & soft
         return self._summed(np.where(hidden, np.minimum(0.5 * rows["force"] ** 2 / stiffness, most), energies))
 
-    def gains(self, before: Array, now: Array, seam: Seam, mass: Array) -> Array:
+    def gains(self, before: Array, now: Array, periodic: Periodicity, mass: Array) -> Array:
         """(n,) J, energy of rows at the positions `now` minus that at `before`, each at its first free particle."""
         share = np.zeros(len(mass))
         if self.gives:
             entry = np.arange(len(self.particle)) + np.where(np.isfinite(mass[self.particle]), 0, len(self.particle))
             whose = self.particle[np.minimum.reduceat(entry, self.first[:-1]) % len(self.particle)]
-            gained = self.energies(now, seam) - self.energies(before, seam)
+            gained = self.energies(now, periodic) - self.energies(before, periodic)
             for rows in self._families():
                 share += np.bincount(whose[rows], gained[rows], len(share))
         return share
 
-    def mobility(self, position: Array, inverse_mass: Array, seam: Seam) -> Array:
+    def mobility(self, position: Array, inverse_mass: Array, periodic: Periodicity) -> Array:
         """(k,) sum of w |grad C|^2 over the particles of each row, C being its value."""
-        moved = inverse_mass[self.particle] * self.gradients(position, seam)
+        moved = inverse_mass[self.particle] * self.gradients(position, periodic)
         return np.asarray(np.add.reduceat(moved, self.first[:-1]))
 
 

@@ -8,15 +8,15 @@ from typing import Any, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from pyverlet.ground import checks
-from pyverlet.ground.arrays import Array
-from pyverlet.ground.errors import InputError
-from pyverlet.ground.lists import several
-from pyverlet.ground.shown import listed
-from pyverlet.ground.step_lock import Shared, in_turn, of_one_frame
+from pyverlet.common import checks
+from pyverlet.common.arrays import Array
+from pyverlet.common.errors import InputError
+from pyverlet.common.lists import several
+from pyverlet.common.shown import listed
+from pyverlet.common.step_lock import Shared, between_frames, exclusive
 from pyverlet.laws.links._link import Link
 from pyverlet.laws.links._pool import DISTANCE, Pool
-from pyverlet.state.seam import Seam
+from pyverlet.state.periodicity import Periodicity
 from pyverlet.state.state import State
 
 AnyLink = TypeVar("AnyLink", bound=Link)
@@ -48,7 +48,7 @@ class Links(Shared):
 
     # ---- a list --------------------------------------------------------------------------------------------------------
 
-    @in_turn
+    @exclusive
     def append(self, link: AnyLink) -> AnyLink:
         """Add a link, or the many that one object contains; returns it.
 
@@ -62,7 +62,7 @@ class Links(Shared):
         if link._pool is not None:
             raise InputError(f"{link!r} is in a world already; allowed is a new one")
         link._find()
-        link._check(self._state.seam)
+        link._check(self._state.periodic)
         link._pool, link._id = self._pool, self._next_owner
         link._pool.append(link._id, link.particles, link._rows())
         if link._moving:
@@ -81,12 +81,12 @@ class Links(Shared):
         self.extend(links)
         return self
 
-    def check(self, seam: Seam) -> None:
+    def check(self, periodic: Periodicity) -> None:
         """Raise InputError if a link does not fit into a room with this periodicity."""
         for link in self:
-            link._check(seam)
+            link._check(periodic)
 
-    @in_turn
+    @exclusive
     def remove(self, link: Link) -> None:
         """Remove a link.
 
@@ -177,7 +177,7 @@ class Links(Shared):
 
     @iterations.setter
     def iterations(self, value: int) -> None:
-        self._iterations = checks.whole("iterations", value)
+        self._iterations = checks.integer("iterations", value)
 
     # ---- a frame -------------------------------------------------------------------------------------------------------
 
@@ -190,13 +190,13 @@ class Links(Shared):
             self._apart_stale, self._apart_among = False, len(self._state)
         return self._apart
 
-    def accept(self, torn: list[tuple[int, float]]) -> None:
+    def accept(self, broken_rows: list[tuple[int, float]]) -> None:
         """After a successful frame: remove the rows that broke in it, given with their tension, N."""
-        if not torn:
+        if not broken_rows:
             self.broken = self.broken[:0]
             return
-        self.broken, number = np.empty(len(torn), BROKEN), {owner: k for k, owner in enumerate(self._links)}
-        for k, (row, pull) in enumerate(torn):
+        self.broken, number = np.empty(len(broken_rows), BROKEN), {owner: k for k, owner in enumerate(self._links)}
+        for k, (row, pull) in enumerate(broken_rows):
             link = self._links[owner := int(self._pool.rows["owner"][row])]
             ends = link.particles[within := row - link._where.start]
             self.broken[k] = (number[owner], within, ends[0], ends[-1], pull, link._number[within][[0, -1]])
@@ -210,10 +210,10 @@ class Links(Shared):
         At current positions, links too stiff for coordinates to resolve their stretch count F^2 / 2 k, by their tension F.
         """
         if where is None:
-            return self.pool.energy_by_pull(self._state.shown["position"], self._state.seam)
-        return self.pool.energy(where, self._state.seam)
+            return self.pool.energy_by_pull(self._state.shown["position"], self._state.periodic)
+        return self.pool.energy(where, self._state.periodic)
 
-    @of_one_frame
+    @between_frames
     def segments(self) -> tuple[Array, Array]:
         """Intact links as lines: ends (m, 2, 2) in m, and the tension (m,) of each in N, negative if it pushes.
 
@@ -221,7 +221,7 @@ class Links(Shared):
         """
         pairs, force = self.pulls()
         ends = self._state.position[pairs]
-        ends[:, 1] = ends[:, 0] + self._state.seam.nearest(ends[:, 1] - ends[:, 0])
+        ends[:, 1] = ends[:, 0] + self._state.periodic.nearest(ends[:, 1] - ends[:, 0])
         return ends, force
 
     def pulls(self) -> tuple[Array, Array]:

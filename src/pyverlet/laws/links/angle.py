@@ -7,8 +7,8 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import ArrayLike
 
-from pyverlet.ground.arrays import Floats
-from pyverlet.ground.errors import InputError
+from pyverlet.common.arrays import Floats
+from pyverlet.common.errors import InputError
 from pyverlet.laws.links._ends import parse
 from pyverlet.laws.links._link import GIVES, Link, Numbers, compliance, damping, finite, several, strength
 from pyverlet.laws.links._pool import ANGLE, MOTOR
@@ -45,7 +45,7 @@ class Angle(Link):
         super().__init__(*parse("Angle", ends, ("i", "j", "k")))
         if angle is None:
             i, j, k = self._state.position[self.particles.T].astype(np.float64)
-            (ax, ay), (bx, by) = self._state.seam.nearest(i - j).T, self._state.seam.nearest(k - j).T
+            (ax, ay), (bx, by) = self._state.periodic.nearest(i - j).T, self._state.periodic.nearest(k - j).T
             angle = np.arctan2(ax * by - ay * bx, ax * bx + ay * by)
         self.angle = angle
         self._set_give(compliance=compliance, damping=damping, breaking_torque=breaking_torque)

@@ -7,7 +7,7 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from pyverlet.ground.errors import InputError
+from pyverlet.common.errors import InputError
 from pyverlet.laws.links._ends import parse_ring
 from pyverlet.laws.links._link import Link, Numbers, compliance, damping, several
 from pyverlet.laws.links._pool import AREA
@@ -43,8 +43,8 @@ class Area(Link):
     ) -> None:
         state, particles = parse_ring("Area", group, ring)
         corners = state.position[particles].astype(np.float64)
-        if state.seam:  # each corner is the nearest image of the one before
-            sides = state.seam.nearest(np.diff(corners, axis=0, prepend=corners[:1]))
+        if state.periodic:  # each corner is the nearest image of the one before
+            sides = state.periodic.nearest(np.diff(corners, axis=0, prepend=corners[:1]))
             corners = corners[0] + np.cumsum(sides, axis=0)
         now = signed_area(corners)
         if crossing := first_crossing(corners):

@@ -7,14 +7,14 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import ArrayLike
 
-from pyverlet.ground import checks
-from pyverlet.ground.arrays import Floats
-from pyverlet.ground.errors import InputError
+from pyverlet.common import checks
+from pyverlet.common.arrays import Floats
+from pyverlet.common.errors import InputError
 from pyverlet.laws.links._ends import parse
 from pyverlet.laws.links._link import GIVES, Link, Numbers, compliance, damping, several, strength
 from pyverlet.laws.links._pool import DISTANCE
 from pyverlet.laws.surface import Fixed
-from pyverlet.state.seam import Seam
+from pyverlet.state.periodicity import Periodicity
 
 
 class Distance(Link):
@@ -30,16 +30,16 @@ class Distance(Link):
         super().__init__(*parse(type(self).__name__, ends, ("i", "j")))
         if length is None:
             places = self._state.position[self.particles].astype(np.float64)
-            self._length: Floats = np.hypot(*self._state.seam.nearest(places[:, 1] - places[:, 0]).T)
+            self._length: Floats = np.hypot(*self._state.periodic.nearest(places[:, 1] - places[:, 0]).T)
         else:
             self.length = length
         self._set_give(**gives)
         self._collide = checks.flag(f"{type(self).__name__}: collide", collide)
 
-    def _check(self, seam: Seam) -> None:
-        if not seam:
+    def _check(self, periodic: Periodicity) -> None:
+        if not periodic:
             return
-        half = 0.5 * seam.shortest
+        half = 0.5 * periodic.shortest
         if (wrong := np.flatnonzero(self._length > half)).size:
             k = int(wrong[0])
             what = f"{type(self).__name__}: length[{k}] is {self._length[k]:g} m"

@@ -7,8 +7,8 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import ArrayLike
 
-from pyverlet.ground import checks
-from pyverlet.ground.arrays import Floats
+from pyverlet.common import checks
+from pyverlet.common.arrays import Floats
 from pyverlet.laws.links._ends import parse
 from pyverlet.laws.links._link import GIVES, Link, Numbers, compliance, damping, strength
 from pyverlet.laws.links._pool import PIN

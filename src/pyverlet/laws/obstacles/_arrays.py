@@ -9,14 +9,14 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from pyverlet.common import memory
+from pyverlet.common.arrays import Array
 from pyverlet.core import unit
-from pyverlet.ground import memory
-from pyverlet.ground.arrays import Array
 from pyverlet.laws.obstacles import rows as at
 from pyverlet.laws.obstacles._base import Obstacle, Obstacles, journal
 from pyverlet.laws.obstacles._grid import cells_for, check_distance
-from pyverlet.state.seam import NONE, Seam
-from pyverlet.state.state import EVERYONE, meet
+from pyverlet.state.periodicity import NONE, Periodicity
+from pyverlet.state.state import EVERYONE, may_collide
 
 _STANDING, _BODY, _MARKS = 12, 7, slice(10, 12)
 """Columns of a segment in `core.obstacle_queries`: their number, the body, category and mask."""
@@ -43,10 +43,10 @@ class ObstacleArrays:
 
     Args:
         obstacles: the world's list, whose changes are read at the start of each frame.
-        seam: periodicity of the room.
+        periodic: periodicity of the room.
 
     Attributes:
-        seam: periodicity of the room. A periodic room is surrounded by images of all obstacles, because circles move beyond it
+        periodic: that of the room. A periodic room is surrounded by images of all obstacles, because circles move beyond it
             within a frame.
         seen: the obstacles of the last frame, as read by `begin`; later ones are added to the same list.
         first: first segment of each, and one more.
@@ -62,8 +62,8 @@ class ObstacleArrays:
         sensors, sensors_move: indices of sensors, and whether any of them moves.
     """
 
-    def __init__(self, obstacles: Obstacles, seam: Seam = NONE) -> None:
-        self._obstacles, self.seam, self.version, self.solid_version = obstacles, seam, 0, 0
+    def __init__(self, obstacles: Obstacles, periodic: Periodicity = NONE) -> None:
+        self._obstacles, self.periodic, self.version, self.solid_version = obstacles, periodic, 0, 0
         self.seen: list[Obstacle] = []
         self._listed = self._revision = -1
         self._own_bodies, self._own_segments = np.zeros((0, 6)), np.zeros((0, at.WIDTH))
@@ -83,7 +83,7 @@ class ObstacleArrays:
 
     def __reduce__(self) -> Any:
         """Copies are built anew."""
-        return type(self), (self._obstacles, self.seam)
+        return type(self), (self._obstacles, self.periodic)
 
     def __bool__(self) -> bool:
         return bool(self._obstacles)
@@ -98,7 +98,7 @@ class ObstacleArrays:
     def begin(self) -> None:
         """At the start of a frame: read what has changed."""
         fresh: set[int] = set()
-        if self._listed != self._obstacles.version or self._imaged != self.seam:
+        if self._listed != self._obstacles.version or self._imaged != self.periodic:
             fresh = set(map(id, self._take()))
         if self._revision == journal.latest:
             return
@@ -118,7 +118,7 @@ class ObstacleArrays:
         """Row numbers of the segments of these obstacles, those of images last."""
         each = [np.arange(self.first[k], self.first[k + 1]) for k in which] or [self.first[:0]]
         own = each[0] if len(each) == 1 else np.concatenate(each)
-        if not self.seam:
+        if not self.periodic:
             return own
         sides = len(self._own_segments)
         return (own + sides * np.arange(len(self.segments) // max(sides, 1))[:, None]).ravel()
@@ -147,7 +147,7 @@ class ObstacleArrays:
             place = np.full(before, -1)
             place[kept] = np.flatnonzero(order < before)
             self.places = place if self.places is None else np.where(self.places < 0, -1, place[self.places])
-        if order is None and not fresh and self._imaged == self.seam:
+        if order is None and not fresh and self._imaged == self.periodic:
             return fresh
         self.solid_version += any(not obstacle.sensor for obstacle in fresh)
         self._append(fresh, before)
@@ -158,7 +158,7 @@ class ObstacleArrays:
             self.seen = now
             self._put_in_order(order)
         self._imagine()
-        if order is not None or self.seam:
+        if order is not None or self.periodic:
             self._numbers = self.changes = None
         else:
             for k, obstacle in enumerate(fresh, before):
@@ -216,7 +216,7 @@ class ObstacleArrays:
         """Read a changed obstacle: its surface, or only its motion."""
         obstacle, count, sides = self.seen[k], len(self._own_bodies), len(self._own_segments)
         body, did, does = at.body_of(obstacle), int(self._does[k]), at.doing_of(obstacle)
-        for image, (x, y) in enumerate(self.seam.images().tolist()):
+        for image, (x, y) in enumerate(self.periodic.images().tolist()):
             self.bodies[image * count + k] = (body[0] + x, body[1] + y, *body[2:])
             if resurfaced:
                 at.set_surface(self.segments[image * sides + self.first[k] : image * sides + self.first[k + 1]], obstacle)
@@ -244,10 +244,10 @@ class ObstacleArrays:
 
     def _imagine(self) -> None:
         """Write the obstacles and, in a periodic room, their images around it."""
-        self.bodies, self.segments, self._imaged = self._own_bodies, self._own_segments, self.seam
-        if not self.seam:
+        self.bodies, self.segments, self._imaged = self._own_bodies, self._own_segments, self.periodic
+        if not self.periodic:
             return
-        shift, count, sides = self.seam.images(), len(self.bodies), len(self.segments)
+        shift, count, sides = self.periodic.images(), len(self.bodies), len(self.segments)
         self.bodies, self.segments = np.tile(self.bodies, (len(shift), 1)), np.tile(self.segments, (len(shift), 1))
         self.bodies[:, at.X] += np.repeat(shift[:, 0], count)
         self.bodies[:, at.Y] += np.repeat(shift[:, 1], count)
@@ -262,10 +262,10 @@ class ObstacleArrays:
         self._frames += 1
         _tools().carry(self._own_bodies, self._moving, dt)
         moved = self._own_bodies[self._moving]
-        if self.seam:
-            moved[:, : at.ANGLE] = self.seam.wrapped(moved[:, : at.ANGLE].copy())
+        if self.periodic:
+            moved[:, : at.ANGLE] = self.periodic.wrapped(moved[:, : at.ANGLE].copy())
             self._own_bodies[self._moving] = moved
-            for image, shift in enumerate(self.seam.images()):
+            for image, shift in enumerate(self.periodic.images()):
                 self.bodies[image * len(self._own_bodies) + self._moving, : at.VX] = moved[:, : at.VX] + (*shift, 0.0)
         for k, (x, y, angle, *_) in zip(self._moving.tolist(), moved.tolist(), strict=True):
             self.seen[k].carry((x, y), angle)
@@ -293,13 +293,13 @@ class ObstacleArrays:
         if self.seen and len(position):
             limit = np.broadcast_to(np.asarray(radius, float), len(position)).copy()
             self._place(0.0, 1.01 * float(limit.max()))
-            points = self.seam.wrapped(np.ascontiguousarray(position, np.float64))
+            points = self.periodic.wrapped(np.ascontiguousarray(position, np.float64))
             row, segment, gap, _, inside = self._query((self._cell, self._heads, self._links), points, limit, row)
         if not len(row):  # fast path: no obstacle is near
             return Near(row, row, gap)
         marks = (np.broadcast_to(np.asarray(each, np.uint32), len(position))[row] for each in (category, mask))
         body, gap = self._standing[segment, _BODY].astype(np.int64) % len(self.seen), np.where(inside, -np.inf, gap)
-        seen = np.flatnonzero(meet(*marks, *self._standing[segment, _MARKS].T))
+        seen = np.flatnonzero(may_collide(*marks, *self._standing[segment, _MARKS].T))
         best = seen[_least(gap[seen], row[seen], body[seen])]
         return Near(row[best], body[best], gap[best])
 
@@ -331,11 +331,11 @@ class ObstacleArrays:
     def _query(self, grid: tuple[Any, ...], points: Array, limit: Array, wanted: Array) -> list[Array]:
         """Results of `core.obstacle_queries.segments_near` in a grid: row, segment, gap, normal, whether inside."""
         answer: list[Array] = []
-        room, about = 64 + len(points) // 4, (self._standing, len(self.seen), *grid, points, limit, wanted.astype(np.int64))
-        while not answer or room > len(answer[0]):
-            answer = [*np.empty((2, room), np.int64), np.empty(room), np.empty((room, 2)), np.empty(room, np.int64)]
-            room = _tools().segments_near(*about, *answer)
-        return [column[:room] for column in answer]
+        size, about = 64 + len(points) // 4, (self._standing, len(self.seen), *grid, points, limit, wanted.astype(np.int64))
+        while not answer or size > len(answer[0]):
+            answer = [*np.empty((2, size), np.int64), np.empty(size), np.empty((size, 2)), np.empty(size, np.int64)]
+            size = _tools().segments_near(*about, *answer)
+        return [column[:size] for column in answer]
 
     def standing(self, within: float) -> tuple[Any, ...] | None:
         """Segments, their grid, which reaches `within` m about them, its bounds, and the number of obstacles; None if empty."""
@@ -351,7 +351,7 @@ class ObstacleArrays:
 
     def _place(self, ahead: float, within: float) -> None:
         """Update the grid to the places of obstacles in `ahead` seconds."""
-        placed = self.version, self.seam, self._frames, ahead if len(self._moving) else 0.0
+        placed = self.version, self.periodic, self._frames, ahead if len(self._moving) else 0.0
         if placed != self._placed or within > self._cell:
             self._standing, self._extent = self._stand(ahead), None
             self._make_grid(max(within, self._cell))
@@ -376,13 +376,13 @@ class ObstacleArrays:
             farthest = np.maximum(np.abs(x), np.abs(y)) + length + around
         check_distance(farthest, np.inf, self._standing[:, 7], len(self.seen))
         cell = max(within, float(np.median(around + length)), float(farthest.max()) / _TOO_FAR, float(np.finfo(float).tiny))
-        self._cell, self._heads, room = cells_for(cell, length, around, 1.0)
+        self._cell, self._heads, size = cells_for(cell, length, around, 1.0)
         used = -1
         while used < 0:
-            if len(self._links) < room:
-                self._links = np.empty((room, 2), np.int32)
+            if len(self._links) < size:
+                self._links = np.empty((size, 2), np.int32)
             used = _tools().list_segments(self._standing, self._cell, self._cell, self._heads, self._links)
-            room *= 2
+            size *= 2
 
 
 def _tools() -> Any:

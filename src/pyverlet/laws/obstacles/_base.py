@@ -14,11 +14,11 @@ from typing import TYPE_CHECKING, Any, NamedTuple, SupportsIndex, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from pyverlet.ground import checks
-from pyverlet.ground.checked import Checked
-from pyverlet.ground.errors import InputError
-from pyverlet.ground.lists import CheckedList
-from pyverlet.ground.shown import listed
+from pyverlet.common import checks
+from pyverlet.common.checked import Checked
+from pyverlet.common.errors import InputError
+from pyverlet.common.lists import CheckedList
+from pyverlet.common.shown import listed
 from pyverlet.laws.surface import Surface
 
 _DASHES = 12

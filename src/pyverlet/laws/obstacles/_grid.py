@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from pyverlet.ground.arrays import Array
-from pyverlet.ground.constants import OBSTACLE_LINKS
-from pyverlet.ground.errors import InputError
+from pyverlet.common.arrays import Array
+from pyverlet.common.constants import OBSTACLE_LINKS
+from pyverlet.common.errors import InputError
 
 
 def check_distance(farthest: Array, most: float, body: Array, count: int) -> None:

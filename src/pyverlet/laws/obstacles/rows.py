@@ -9,7 +9,7 @@ import math
 
 import numpy as np
 
-from pyverlet.ground.arrays import Array
+from pyverlet.common.arrays import Array
 from pyverlet.laws.obstacles._base import Obstacle
 
 OF, FIRST, FACES, AROUND = 0, 1, 2, 3

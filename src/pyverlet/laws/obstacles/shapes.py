@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from pyverlet.ground import checks
-from pyverlet.ground.checked import Checked
-from pyverlet.ground.errors import InputError
+from pyverlet.common import checks
+from pyverlet.common.checked import Checked
+from pyverlet.common.errors import InputError
 from pyverlet.laws.obstacles._base import Obstacle, Outline, Parts, Points
 from pyverlet.laws.surface import Fixed
 

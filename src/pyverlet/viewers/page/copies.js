@@ -1,4 +1,4 @@
-// Periodic rooms: circles that reach through a seam are drawn once more, on the other side, and links through it from both ends.
+// Periodic rooms: circles that reach through a periodic boundary are drawn once more, on the other side, and links through it from both ends.
 
 /** Grid, radii and tints of all circles of a frame, and behind them those of its copies. */
 export function withCopies({ grid, copies }, radius, tint) {
@@ -14,10 +14,10 @@ function joined(one, other) {
   return all;
 }
 
-/** As the server finds them: circles at (x(i), y(i)) metres that reach through the seams of a shape. */
-export function copiesOf({ seams, radius }, x, y) {
+/** As the server finds them: circles at (x(i), y(i)) metres that reach through the periodicities of a shape. */
+export function copiesOf({ periodicities, radius }, x, y) {
   const owner = [], places = [];
-  for (const [first, count, [lowX, lowY, periodX, periodY]] of seams) {
+  for (const [first, count, [lowX, lowY, periodX, periodY]] of periodicities) {
     for (let i = first; i < first + count; i++) {
       const dx = side(x(i), radius[i], lowX, periodX), dy = side(y(i), radius[i], lowY, periodY);
       const moves = dx && dy ? [[dx, 0], [0, dy], [dx, dy]] : dx || dy ? [[dx, dy]] : [];
@@ -41,13 +41,13 @@ export const nearest = (difference, period) => (period ? difference - period * M
 
 const known = new WeakMap();
 
-/** Periods in x and y of each of n circles, metres: (2n,), or null without a seam. */
-export function periods(seams, n) {
-  if (!seams?.length) return null;
-  if (known.get(seams)?.length !== 2 * n) {
+/** Periods in x and y of each of n circles, metres: (2n,), or null without a period. */
+export function periods(periodicities, n) {
+  if (!periodicities?.length) return null;
+  if (known.get(periodicities)?.length !== 2 * n) {
     const all = new Float64Array(2 * n);
-    for (const [first, count, [, , x, y]] of seams) for (let i = first; i < first + count; i++) [all[2 * i], all[2 * i + 1]] = [x, y];
-    known.set(seams, all);
+    for (const [first, count, [, , x, y]] of periodicities) for (let i = first; i < first + count; i++) [all[2 * i], all[2 * i + 1]] = [x, y];
+    known.set(periodicities, all);
   }
-  return known.get(seams);
+  return known.get(periodicities);
 }

@@ -13,7 +13,7 @@ const MEANS = {
   limiter: "taken back by the energy limiter, of what contacts had gained too much",
   walls: "brought by a room that turns",
   outside: "what the circles had at the start, and what was done between frames",
-  seam: "of circles that fell through the seam of a periodic room, and are up again",
+  seam: "of circles that fell through the periodic boundary of a periodic room, and are up again",
   residual: "left over: the error of the integrator",
 };
 

@@ -48,7 +48,7 @@ export class Overlay {
       this.marks = drawMarks(context, frame.turned, shape.radius, camera.scale, { x, y, seen });
       if (frame.copies) this.marks += drawMarks(context, ...copied(frame, shape.radius), camera.scale, scaled(frame.copies.places, place));
     }
-    this.links = drawLinks(context, frame, { x, y, seen }, dark, periods(shape.seams, n)?.map((metres) => metres * camera.scale));
+    this.links = drawLinks(context, frame, { x, y, seen }, dark, periods(shape.periodicities, n)?.map((metres) => metres * camera.scale));
     this.forces = wants.forces ? drawForces(context, frame, shape.radius, camera.scale, { x, y, seen }, dark) : 0;
     if (wants.contacts && n <= MOST_CONTACTS) {
       context.beginPath();

@@ -98,7 +98,7 @@ export function message({ chunk, row }, seq, part, after, share, shape) {
   const now = chunk.position.subarray(2 * row * n, 2 * (row + 1) * n);
   const next = between ? after.chunk.position.subarray(2 * after.row * n, 2 * (after.row + 1) * n) : now;
   const grid = new Uint16Array(2 * n), low = [x0, y0], scale = [GRID_MAX / (x1 - x0), GRID_MAX / (y1 - y0)];
-  const period = periods(shape?.seams, n), metres = (i) => (now[i] + between * nearest(next[i] - now[i], period?.[i] / step)) * step;
+  const period = periods(shape?.periodicities, n), metres = (i) => (now[i] + between * nearest(next[i] - now[i], period?.[i] / step)) * step;
   const onGrid = (value, axis) => Math.min(Math.max(Math.round((value - low[axis]) * scale[axis]), 0), GRID_MAX);
   for (let i = 0; i < 2 * n; i++) grid[i] = onGrid(metres(i), i & 1);
   const { owner, places } = period ? copiesOf(shape, (i) => metres(2 * i), (i) => metres(2 * i + 1)) : { owner: [] };

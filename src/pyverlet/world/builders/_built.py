@@ -11,10 +11,10 @@ from typing import TYPE_CHECKING, Any, ParamSpec, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from pyverlet.ground import checks
-from pyverlet.ground.constants import STANDARD_GRAVITY
-from pyverlet.ground.errors import InputError
-from pyverlet.ground.shown import Shown
+from pyverlet.common import checks
+from pyverlet.common.constants import STANDARD_GRAVITY
+from pyverlet.common.errors import InputError
+from pyverlet.common.shown import Shown
 from pyverlet.laws.links import Link
 from pyverlet.state.group import Group
 
@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 Point = Sequence[float] | NDArray[np.float64]
 
 RIM = 0.49
-"""Radius of linked particles over their spacing: neighbours almost touch, so that nothing slips through."""
+"""Radius of linked particles over their spacing: neighbours almost touch, so that nothing gets through."""
 
 
 @dataclass(frozen=True, repr=False)

@@ -9,12 +9,12 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from pyverlet.ground import checks
-from pyverlet.ground.arrays import Floats
-from pyverlet.ground.errors import InputError
-from pyverlet.ground.shown import count
+from pyverlet.common import checks
+from pyverlet.common.arrays import Floats
+from pyverlet.common.errors import InputError
+from pyverlet.common.shown import count
 from pyverlet.laws.obstacles import Obstacle
-from pyverlet.world.builders.region import Ink, Region
+from pyverlet.world.builders.region import PictureMask, Region
 from pyverlet.world.queries import overlapping
 from pyverlet.world.world import World
 
@@ -94,15 +94,15 @@ def fill(
     low, high = radius if isinstance(radius, tuple) else (radius, radius)
     low = checks.number("radius", low, above=0.0)
     high = checks.number("radius", high, least=low)
-    region, rng = Region(where, avoid), np.random.default_rng(checks.whole("seed", seed, least=0))
+    region, rng = Region(where, avoid), np.random.default_rng(checks.integer("seed", seed, least=0))
     if fraction is None and pattern == "random" and count is None:
         fraction = SCATTERED
     # The mean of r^2 of a uniform distribution from low to high.
     each = np.pi * (low * low + low * high + high * high) / 3
-    wanted = None if count is None else checks.whole("count", count, most=MOST)
-    ink = Ink(picture, region.extent) if picture is not None else None
+    wanted = None if count is None else checks.integer("count", count, most=MOST)
+    picture_mask = PictureMask(picture, region.extent) if picture is not None else None
     if fraction is not None:
-        area = region.area() if ink is None else ink.area()
+        area = region.area() if picture_mask is None else picture_mask.area()
         wanted = max(1, round(checks.number("fraction", fraction, above=0.0) * area / each))
     x0, y0, x1, y1 = region.extent
     if (wanted or (x1 - x0) * (y1 - y0) / (2 * 3**0.5 * high * high)) > MOST:
@@ -115,13 +115,13 @@ def fill(
 
     def sites(apart: float) -> Floats:
         points = lattice(region.extent, high, apart)
-        if ink is not None:
-            points = points[ink.covers(points)]
+        if picture_mask is not None:
+            points = points[picture_mask.covers(points)]
         return points[region.free(points, np.full(len(points), high))]
 
     places = _spaced(sites, 2 * high * (1 + GAP), wanted, (x1 - x0) + (y1 - y0), pattern)
     sizes = rng.uniform(low, high, len(places)) if high > low else np.full(len(places), high)
-    return Filling(places, sizes, None if ink is None else ink.colours(places))
+    return Filling(places, sizes, None if picture_mask is None else picture_mask.colours(places))
 
 
 PATTERNS = ("hex", "square", "random", "picture")

@@ -7,9 +7,9 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from pyverlet.ground import checks
-from pyverlet.ground.arrays import Floats
-from pyverlet.ground.errors import InputError
+from pyverlet.common import checks
+from pyverlet.common.arrays import Floats
+from pyverlet.common.errors import InputError
 from pyverlet.laws.links.area import first_crossing, signed_area
 from pyverlet.world.builders._built import Point
 
@@ -21,7 +21,7 @@ def disc(center: Point, radius: float, *, corners: int = 64) -> Floats:
     """A circle as a polygon with `corners` corners."""
     r, angle = (
         checks.number("radius", radius, above=0.0),
-        np.linspace(0, 2 * np.pi, checks.whole("corners", corners, least=3) + 1),
+        np.linspace(0, 2 * np.pi, checks.integer("corners", corners, least=3) + 1),
     )
     return np.array(checks.vector("center", center)) + r * np.column_stack((np.cos(angle), np.sin(angle)))[:-1]
 

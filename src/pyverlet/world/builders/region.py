@@ -1,4 +1,4 @@
-"""The free region for new circles: inside a room or polygon, clear of obstacles and circles, and where a picture has ink."""
+"""The free region for new circles: inside a room or polygon, clear of obstacles and circles, and where a picture is dark."""
 
 from __future__ import annotations
 
@@ -9,12 +9,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from pyverlet.ground.arrays import Floats
-from pyverlet.ground.errors import InputError
-from pyverlet.ground.outside import read_picture
+from pyverlet.common.arrays import Floats
+from pyverlet.common.errors import InputError
+from pyverlet.common.outside import read_picture
+from pyverlet.laws.boundaries import Boundary
 from pyverlet.laws.links.area import signed_area
 from pyverlet.laws.obstacles import Chain, Obstacle, ObstacleArrays, Obstacles, Polygon
-from pyverlet.laws.rooms import Boundary
 from pyverlet.state.state import EVERYONE
 from pyverlet.world.builders.outline import inside, simple_polygon
 from pyverlet.world.queries import ROUNDING, overlapping
@@ -75,12 +75,12 @@ def _walls(where: Any) -> tuple[Callable[[Floats, Floats], Flags], tuple[float, 
         if extent is None or facing is None:
             raise InputError(f"where is {where!r}; allowed is a room with walls, such as pyverlet.Box, or a polygon")
 
-        def in_room(points: Floats, radius: Floats) -> Flags:
+        def in_boundary(points: Floats, radius: Floats) -> Flags:
             distance = where.facing(points)
             assert distance is not None
             return np.asarray((distance[0].min(axis=1) >= radius) & ~where.outside(points))
 
-        return in_room, tuple(map(float, extent))  # type: ignore[return-value]
+        return in_boundary, tuple(map(float, extent))  # type: ignore[return-value]
     corners = where.points if isinstance(where, Polygon) else _polygon(where)
     (x0, y0), (x1, y1) = corners.min(axis=0), corners.max(axis=0)
     sides = ObstacleArrays(Obstacles([Chain(corners, closed=True)]))
@@ -107,7 +107,7 @@ def _polygon(where: ArrayLike) -> Floats:
     return corners
 
 
-class Ink:
+class PictureMask:
     """A picture scaled to fit a rectangle and centred in it.
 
     Args:
@@ -122,18 +122,18 @@ class Ink:
         self._metres = min((x1 - x0) / width, (y1 - y0) / height)  # per pixel
         self._left, self._top = 0.5 * (x0 + x1 - width * self._metres), 0.5 * (y0 + y1 + height * self._metres)
         opaque = self._pixels[..., 3] > 127
-        self._inked = opaque & (self._pixels[..., :3] < PAPER).any(axis=2)
-        if not self._inked.any():
+        self._covered = opaque & (self._pixels[..., :3] < PAPER).any(axis=2)
+        if not self._covered.any():
             raise InputError("picture is white or transparent everywhere; allowed is one with something on it")
 
     def area(self) -> float:
-        """Area covered by ink, m^2."""
-        return float(self._inked.sum() * self._metres**2)
+        """Dark area, m^2."""
+        return float(self._covered.sum() * self._metres**2)
 
     def covers(self, points: Floats) -> NDArray[np.bool_]:
-        """(k,) whether there is ink at each point (k, 2), m."""
+        """(k,) whether the picture is dark at each point (k, 2), m."""
         row, column, within = self._at(points)
-        return np.asarray(within & self._inked[row, column])
+        return np.asarray(within & self._covered[row, column])
 
     def colours(self, points: Floats) -> NDArray[np.uint8]:
         """(k, 3) bytes R, G, B at these points."""
@@ -141,7 +141,7 @@ class Ink:
         return np.ascontiguousarray(self._pixels[row, column, :3])
 
     def _at(self, points: Floats) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.bool_]]:
-        height, width = self._inked.shape
+        height, width = self._covered.shape
         column = np.floor((points[:, 0] - self._left) / self._metres).astype(np.int64)
         row = np.floor((self._top - points[:, 1]) / self._metres).astype(np.int64)
         within = (column >= 0) & (column < width) & (row >= 0) & (row < height)

@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from pyverlet.ground import checks
-from pyverlet.ground.arrays import Floats
-from pyverlet.ground.errors import InputError
+from pyverlet.common import checks
+from pyverlet.common.arrays import Floats
+from pyverlet.common.errors import InputError
 from pyverlet.laws.links import Angle, Area, Link, Spring, Stick
 from pyverlet.world.builders._built import RIM, Built, add, builder, weight
 from pyverlet.world.builders.outline import inside, simple_polygon, walk

@@ -6,9 +6,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from pyverlet.ground import checks
-from pyverlet.ground.arrays import Indices
-from pyverlet.ground.errors import InputError
+from pyverlet.common import checks
+from pyverlet.common.arrays import Indices
+from pyverlet.common.errors import InputError
 from pyverlet.laws.links import Link, Rope, Spring, Stick
 from pyverlet.state.group import Group
 from pyverlet.world.builders._built import Built, Point, Sheet, add, builder, weight
@@ -21,7 +21,7 @@ def lay_line(
     world: World, start: Point, end: Point, links: int, length: float | None, mass: float, radius: float | None, **particles: Any
 ) -> tuple[Group, Indices, float]:
     """Add particles along a line; returns them, the index of the first end of each link, and the length of a link, m."""
-    count = checks.whole("links", links)
+    count = checks.integer("links", links)
     a, b = np.array(checks.vector("start", start)), np.array(checks.vector("end", end))
     if not (apart := float(np.hypot(*(b - a)))):
         raise InputError(f"end is {tuple(map(float, b))}, where start is; allowed is another point")
@@ -125,7 +125,7 @@ def bridge(
     checks.number("slack", slack, least=0.0)
     apart = float(np.hypot(*(np.subtract(checks.vector("end", end), checks.vector("start", start)))))
     built = rope(
-        world, start, end, length=(1 + slack) * apart, links=checks.whole("planks", planks) + 1, mass=mass, radius=radius,
+        world, start, end, length=(1 + slack) * apart, links=checks.integer("planks", planks) + 1, mass=mass, radius=radius,
         breaking_force=breaking_force, **particles,
     )  # fmt: skip
     built.group.pin([0, -1])
@@ -177,7 +177,7 @@ def lay_grid(
     """Add particles in a grid, row 0 on top; returns them and their indices (rows, columns)."""
     x0, y0 = checks.vector("top_left", top_left)
     across, down = checks.number("width", width, above=0.0), checks.number("height", height, above=0.0)
-    nx, ny = checks.whole("columns", columns, least=2), checks.whole("rows", rows, least=2)
+    nx, ny = checks.integer("columns", columns, least=2), checks.integer("rows", rows, least=2)
     x, y = np.meshgrid(x0 + np.linspace(0.0, across, nx), y0 - np.linspace(0.0, down, ny))
     place, apart = np.column_stack((x.ravel(), y.ravel())), min(across / (nx - 1), down / (ny - 1))
     group = add(world, place, apart, radius, mass, **particles)
@@ -221,7 +221,7 @@ def cloth(
         compliance: of each piece of thread, m/N.
         shear: stiffness of the diagonal springs, N/m; 0 for none. None: five times the weight over the height.
         breaking_force: force at which a piece of thread or a spring breaks, N. If it is finite, a spring also breaks at three
-            times its length, or it would hold on to pieces that have been torn off.
+            times its length, or it would hold on to pieces that have broken off.
         particles: category, friction and any other argument of `World.add`.
     """
     k = 5.0 * weight(world, mass) / height if shear is None else checks.number("shear", shear, least=0.0)

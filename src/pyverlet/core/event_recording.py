@@ -12,11 +12,11 @@ from pyverlet.core.pair_memory import repeats
 from pyverlet.core.step import Step
 from pyverlet.core.surface_rows import (
     CONTACT,
+    EVENT,
+    EVENT_BOUNCES,
+    EVENT_IMPULSE,
+    EVENT_SPEED,
     GAP,
-    HEARD,
-    HEARD_BOUNCES,
-    HEARD_PUSH,
-    HEARD_SPEED,
     NORMAL,
     PUSH,
     ROUNDED,
@@ -41,14 +41,14 @@ def least_of_pair(w: cython.pointer(Step), k: cython.Py_ssize_t) -> real:
 
 
 @inlined
-def hear_blow(
+def record_impact(
     w: cython.pointer(Step), k: cython.Py_ssize_t, speed: cython.double, given: cython.double, away: cython.double
 ) -> cython.void:  # fmt: skip
     """Record that pair k met at `speed` and got the impulse `given`, over the reduced mass, `away` of it beyond stopping.
 
     It counts as a bounce if `away` exceeds the speed of resting contacts.
     """
-    if w.listening:
+    if w.records_events:
         w.touched[k] = 1
         w.met[k] = max(w.met[k], cython.cast(real, speed))
         w.pressed[k] += cython.cast(real, given)
@@ -57,27 +57,27 @@ def hear_blow(
 
 
 @inlined
-def hear_pair(w: cython.pointer(Step), k: cython.Py_ssize_t, speed: cython.double, away: cython.double) -> cython.void:
+def record_pair(w: cython.pointer(Step), k: cython.Py_ssize_t, speed: cython.double, away: cython.double) -> cython.void:
     """Record that pair k met at a speed and separates at another."""
-    hear_blow(w, k, speed, speed + away, away)
+    record_impact(w, k, speed, speed + away, away)
 
 
 @inlined
-def hear_surface(
+def record_surface(
     w: cython.pointer(Step), i: cython.Py_ssize_t, k: cython.Py_ssize_t, speed: cython.double, away: cython.double
 ) -> cython.void:
     """Record that contact k of particle i with a surface met at `speed` and separates at `away`."""
-    if w.listening:
+    if w.records_events:
         row: cython.pointer(cython.double) = w.contact
-        row[CONTACT * k + HEARD] = 1
-        row[CONTACT * k + HEARD_SPEED] = max(row[CONTACT * k + HEARD_SPEED], speed)
-        row[CONTACT * k + HEARD_PUSH] += speed + away
+        row[CONTACT * k + EVENT] = 1
+        row[CONTACT * k + EVENT_SPEED] = max(row[CONTACT * k + EVENT_SPEED], speed)
+        row[CONTACT * k + EVENT_IMPULSE] += speed + away
         if away > least_bounce(w, i):
-            row[CONTACT * k + HEARD_BOUNCES] += 1
+            row[CONTACT * k + EVENT_BOUNCES] += 1
 
 
 @inlined
-def hear_meeting(
+def record_approach(
     w: cython.pointer(Step), k: cython.Py_ssize_t, speed: lanes, nx: lanes, ny: lanes, before: lanes, after: lanes
 ) -> cython.void:  # fmt: skip
     """Record the approach speed of those of the pairs from k on whose contact begins to act.
@@ -96,16 +96,16 @@ def hear_meeting(
 
 
 @inlined
-def hear_more(w: cython.pointer(Step), k: cython.Py_ssize_t, given: cython.double) -> cython.void:
+def record_more(w: cython.pointer(Step), k: cython.Py_ssize_t, given: cython.double) -> cython.void:
     """Add to the impulse of surface contact k, which was touched in this substep."""
-    if w.listening and w.surface[k] < 0:
+    if w.records_events and w.surface[k] < 0:
         w.pressed[pinned_lane(w, k)] += cython.cast(real, given)
-    elif w.listening:
-        w.contact[CONTACT * k + HEARD_PUSH] += given
+    elif w.records_events:
+        w.contact[CONTACT * k + EVENT_IMPULSE] += given
 
 
 @kernel
-def hear_held(w: cython.pointer(Step), i: cython.Py_ssize_t, vx: cython.double, vy: cython.double) -> cython.void:
+def record_held(w: cython.pointer(Step), i: cython.Py_ssize_t, vx: cython.double, vy: cython.double) -> cython.void:
     """Record the speed at which particle i, which came at (vx, vy), met surfaces that hold it and did not in this frame."""
     k: cython.Py_ssize_t
     row: cython.pointer(cython.double) = w.contact
@@ -114,14 +114,14 @@ def hear_held(w: cython.pointer(Step), i: cython.Py_ssize_t, vx: cython.double, 
         if row[at + PUSH] > 0:
             speed: cython.double = (vx - row[at + SPEED]) * row[at + NORMAL] + (vy - row[at + SPEED + 1]) * row[at + NORMAL + 1]
             if w.surface[k] >= 0:
-                if row[at + HEARD] == 0 and row[at + HEARD_SPEED] == 0:
-                    row[at + HEARD_SPEED] = max(speed, 0.0)
+                if row[at + EVENT] == 0 and row[at + EVENT_SPEED] == 0:
+                    row[at + EVENT_SPEED] = max(speed, 0.0)
             elif w.touched[pinned_lane(w, k)] == 0 and w.met[pinned_lane(w, k)] == 0:
                 w.met[pinned_lane(w, k)] = cython.cast(real, max(speed, 0.0))
 
 
 @kernel
-def hear_loads(w: cython.pointer(Step), s: cython.Py_ssize_t) -> cython.void:
+def record_loads(w: cython.pointer(Step), s: cython.Py_ssize_t) -> cython.void:
     """Record pairs of group s that carry load or overlap as touching; impulses of resting contacts are scaled to h."""
     k: cython.Py_ssize_t
     none: real = 0
@@ -129,41 +129,41 @@ def hear_loads(w: cython.pointer(Step), s: cython.Py_ssize_t) -> cython.void:
     depth: cython.pointer(real) = w.depth
     met: cython.pointer(real) = w.met
     pressed: cython.pointer(real) = w.pressed
-    weigh: real = w.weigh
+    rest_scale: real = w.rest_scale
     touched: cython.pointer(int32_t) = w.touched
     for k in range(w.begin[s], w.begin[s] + w.lanes[s]):  # branch-free, so that it is vectorised
         touched[k] |= (impulse[k] > none) | (depth[k] > none)
         met[k] = met[k] if touched[k] != 0 else none
-        pressed[k] += weigh * impulse[k]
+        pressed[k] += rest_scale * impulse[k]
 
 
 @kernel
-def hear_surface_loads(w: cython.pointer(Step), i: cython.Py_ssize_t) -> cython.void:
+def record_surface_loads(w: cython.pointer(Step), i: cython.Py_ssize_t) -> cython.void:
     """Record surfaces that carry particle i, or touch it up to rounding; clear the speed of others."""
     k: cython.Py_ssize_t
     for k in range(w.contact_begin[i], w.contact_end[i]):
         given: cython.double = w.contact[CONTACT * k + PUSH]
         if w.surface[k] >= 0 and (given > 0 or w.contact[CONTACT * k + GAP] <= ROUNDED * w.radius[i]):
-            w.contact[CONTACT * k + HEARD] = 1
-            w.contact[CONTACT * k + HEARD_PUSH] += w.weigh * given
-        elif w.contact[CONTACT * k + HEARD] == 0:
-            w.contact[CONTACT * k + HEARD_SPEED] = 0
+            w.contact[CONTACT * k + EVENT] = 1
+            w.contact[CONTACT * k + EVENT_IMPULSE] += w.rest_scale * given
+        elif w.contact[CONTACT * k + EVENT] == 0:
+            w.contact[CONTACT * k + EVENT_SPEED] = 0
 
 
 @kernel
-def room_to_hear(w: cython.pointer(Step)) -> cython.Py_ssize_t:
+def count_events(w: cython.pointer(Step)) -> cython.Py_ssize_t:
     """Upper bound of the number of recorded contacts."""
-    room: cython.Py_ssize_t = 0
+    capacity: cython.Py_ssize_t = 0
     for s in range(w.groups):
         for k in range(w.begin[s], w.begin[s] + w.lanes[s]):
-            room += w.touched[k] != 0
+            capacity += w.touched[k] != 0
     for i in range(w.count if w.surfaces_good else 0):
-        room += w.contact_end[i] - w.contact_begin[i]
-    return room
+        capacity += w.contact_end[i] - w.contact_begin[i]
+    return capacity
 
 
 @kernel
-def take_heard(
+def collect_events(
     w: cython.pointer(Step), number: cython.pointer(int64_t), key: cython.pointer(int64_t), speed: cython.p_double,
     bounces: cython.pointer(int64_t), pushes: cython.p_double,
 ) -> cython.Py_ssize_t:  # fmt: skip
@@ -186,10 +186,10 @@ def take_heard(
         for k in range(w.contact_begin[i], w.contact_end[i]):
             row: cython.pointer(cython.double) = w.contact
             at: cython.Py_ssize_t = CONTACT * k
-            if row[at + HEARD] > 0:
+            if row[at + EVENT] > 0:
                 key[n] = (number[w.lists.particle[i]] << 32) + SURFACE_BIT + w.surface[k]
-                speed[n], bounces[n] = row[at + HEARD_SPEED], cython.cast(int64_t, row[at + HEARD_BOUNCES])
-                pushes[n] = row[at + HEARD_PUSH]
-                row[at + HEARD_SPEED] = row[at + HEARD_BOUNCES] = row[at + HEARD] = row[at + HEARD_PUSH] = 0
+                speed[n], bounces[n] = row[at + EVENT_SPEED], cython.cast(int64_t, row[at + EVENT_BOUNCES])
+                pushes[n] = row[at + EVENT_IMPULSE]
+                row[at + EVENT_SPEED] = row[at + EVENT_BOUNCES] = row[at + EVENT] = row[at + EVENT_IMPULSE] = 0
                 n += 1
     return n

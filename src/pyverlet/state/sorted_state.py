@@ -1,4 +1,4 @@
-"""`Slots`, the engine's copy of the particles in its own order.
+"""`SortedState`, the engine's copy of the particles in its own order.
 
 It is sorted so that neighbours in space are neighbours in memory; the order is not visible outside.
 """
@@ -11,10 +11,11 @@ from typing import Any
 import numpy as np
 
 from pyverlet import core
-from pyverlet.ground import memory
-from pyverlet.ground.arrays import Array
-from pyverlet.state import seam
+from pyverlet.common import memory
+from pyverlet.common.arrays import Array
+from pyverlet.common.renamed import Renamed
 from pyverlet.state.neighbours import Near, VerletLists
+from pyverlet.state.periodicity import NONE, Periodicity
 from pyverlet.state.state import COLUMNS, DEFAULTS, EVERYONE, MARKS, MOVING, ROWS, SET, Arrays, State, check_set, moving
 from pyverlet.state.unchanged import Unchanged, blocks_of, columns_differ
 
@@ -22,34 +23,32 @@ _GIVEN, _LISTED, _NUMBERS = (*SET, *MARKS), ("radius", "mass", *MARKS), len(SET)
 _RARE = SET[2:]  # columns of which few worlds have more than one value; a single one is then stored
 
 # Sleep state beyond the user's arrays: dtype, and value for a new particle.
-_REMEMBERED: dict[str, tuple[Any, Any]] = {"island": (np.int64, -1), "calm": (np.float32, 0)}
+_REMEMBERED: dict[str, tuple[Any, Any]] = {"island": (np.int64, -1), "sleep_timer": (np.float32, 0)}
 
 _OWN = (*ROWS, "spin", "radius", "mass", "inverse_mass", *_REMEMBERED)
 """Columns that every particle has here."""
 
 
-class Slots(Arrays):
+class SortedState(Arrays):
     """The engine's working copy, in its own order: what forces, integrators, contacts and bounds use during a frame.
 
     Attributes:
         engine, motion: units of the core for this dtype.
         real: rounds a number to the dtype, with a cache, as rounding in NumPy takes longer than a kernel call.
-        particle: (n,) the user's index of the particle in each slot.
+        particle: (n,) the user's index of the particle of each row.
         position, velocity, acceleration, spin, radius, mass: as in State.
         restitution, friction, rolling_resistance, inertia: as in State, read-only.
         category, mask: as in State, or empty while all circles collide with each other.
         material, fixed_rotation: as in State, or empty while all are 0. materials: as in State.
         most_friction, most_rolling: largest values of their columns; negative if no circle has values of its own.
         unchecked: whether the user's values were read again and have not been checked.
-        own_inertia: whether any has a moment of inertia other than that of a disc.
+        own_inertia: whether any has a moment of inertia other than a disc's. own_walls: whether the room is user-defined.
         revision: how often the user's values were read again, or sleepers changed.
         inverse_mass: (n,) 1/kg; 0 for pinned particles; `pins`: whether there are any. total_mass: of the others, kg.
         force: (n, 2) N, the sum of forces besides gravity in this evaluation.
-        h: length of a substep of this frame, s.
+        h: length of a substep of this frame, s. taken: J that the energy limiter has removed in it.
         thread_team: during a frame the address of the team of threads, and the number of threads in use.
-        island, calm: (n,) number of a sleeper's island, -1 if awake, and time at rest, s; empty unless particles may sleep.
-        own_walls: whether the room is user-defined.
-        taken: J that the energy limiter has removed in this frame.
+        island, sleep_timer: (n,) number of a sleeper's island, -1 if awake, and s at rest; empty unless particles may sleep.
         others: whether particles were added or removed before this frame. fresh: the user's index of the first new one.
         placed: (n,) 1 for particles that the user moved or enlarged before this frame, else 0.
         copied: whether the user's positions, velocities, accelerations and spins were copied in for this frame.
@@ -98,20 +97,21 @@ class Slots(Arrays):
         self._changed = True
         self.crossed = None
         self._scratch: list[Array] = []
-        self._slot_of = self._looked = self._asleep = self._free = None
+        self._sorted_index = self._looked = self._asleep = self._free = None
 
     inverse_mass: Array
     particle: Array
+    slots_of: Any = Renamed("sorted_index")
     thread_team = (0, 1)
     key = ""  # of the world's state
-    room: Any = None
-    seam = seam.NONE  # none, as in a periodic room positions move beyond it within a frame
+    boundary: Any = None
+    periodic: Periodicity = NONE  # none, as in a periodic room positions move beyond it within a frame
     island: Array
-    calm: Array
+    sleep_timer: Array
     crossed: Array | None
     others = copied = own_walls = True
     fresh, own_inertia, unchecked = 0, False, True
-    _slot_of: Array | None
+    _sorted_index: Array | None
     _looked: tuple[bool, bool, bool] | None
     _asleep: Array | None
     _free: Array | None
@@ -121,15 +121,15 @@ class Slots(Arrays):
         """(n, 2) N; allocated on first use."""
         return np.zeros_like(self.position)
 
-    def near(self, reach: float, *, together: bool = False) -> Near:
-        """Pairs of slots closer to each other than `reach` m, in arrays that the next call overwrites.
+    def near(self, cutoff: float, *, together: bool = False) -> Near:
+        """Pairs of rows closer to each other than `reach` m, in arrays that the next call overwrites.
 
         together: include coincident ones, with a direction along x, from the lower user's index to the other.
 
         Raises:
             InputError: a periodic room is narrower than twice that.
         """
-        pairs = self._lists.within(self.position, self.particle, self.seam, reach, together=together)
+        pairs = self._lists.within(self.position, self.particle, self.periodic, cutoff, together=together)
         if together and len(alike := np.flatnonzero(pairs.distance == 0)):
             pairs.way[alike[self.particle[pairs.i[alike]] > self.particle[pairs.j[alike]]], 0] = -1
         return pairs
@@ -156,14 +156,14 @@ class Slots(Arrays):
 
     @property
     def asleep(self) -> Array:
-        """Slots of sleeping particles."""
+        """Rows of sleeping particles."""
         if self._asleep is None:
             self._asleep = np.flatnonzero(self.island >= 0)
         return self._asleep
 
     @property
     def free(self) -> Array:
-        """Slots of particles that are neither pinned nor asleep."""
+        """Rows of particles that are neither pinned nor asleep."""
         if self._free is None:
             self._free = np.flatnonzero(self.inverse_mass > 0)
         return self._free
@@ -192,7 +192,7 @@ class Slots(Arrays):
         self.others = others or self._changed
         if others:
             self._resize(len(state))
-        self.key, self.seam, self.room = state.key, state.seam, state.room
+        self.key, self.periodic, self.boundary = state.key, state.periodic, state.boundary
         first = 0 if self.copied else known  # unchanged rows are not copied again
         if first < len(self):
             rows = [*moving(self), self.particle, self.placed]
@@ -235,7 +235,7 @@ class Slots(Arrays):
             elif changed or known < len(self):
                 memory.take(given, self.particle, getattr(self, name))
         self.update_inverse_mass(0 if changed else known)
-        # Summed in the user's order: that of slots, and so the last bit, differs after a saved world is restored.
+        # Summed in the user's order: that of rows, and so the last bit, differs after a saved world is restored.
         mass, self.pins = state.shown["mass"], not np.isfinite(self._given["mass"]).all()
         self.total_mass = float((mass[np.isfinite(mass)] if self.pins else mass).sum(dtype=float))
         self.own_inertia = bool(self._given["inertia"].any())
@@ -272,24 +272,24 @@ class Slots(Arrays):
         return len(self._given[name]) > 1
 
     def update_inverse_mass(self, first: int = 0) -> None:
-        """Update `inverse_mass` from `mass` and sleep, from slot `first` on."""
+        """Update `inverse_mass` from `mass` and sleep, from row `first` on."""
         with np.errstate(divide="ignore"):  # a mass of 0 is refused later, with a message
             np.divide(1, self.mass[first:], out=self.inverse_mass[first:])
         self._asleep = self._free = None
         self.inverse_mass[self.asleep] = 0
         self.revision += 1
 
-    def clear_notes(self) -> None:
+    def clear_records(self) -> None:
         """Discard the records of walls, periodic boundary and energy limiter in the last frame."""
         vars(self).pop("wall_hits", None)
         self.taken, self.crossed = 0.0, None
 
-    def forget(self, gone: Array, slots: Array, left: Array) -> None:
-        """Remove the user's particles `gone`, which are in these slots; left: (n,) the user's index in each remaining slot."""
+    def forget(self, gone: Array, rows: Array, left: Array) -> None:
+        """Remove the user's particles `gone`, which are in these rows; left: (n,) the user's index of each remaining row."""
         alike, self.particle = self._alike(), left
         for name in (*_OWN, *MARKS):
             if name not in alike and len(column := getattr(self, name)):
-                memory.close_ranks(column, slots)
+                memory.close_ranks(column, rows)
         for name, given in self._given.items():
             if len(given) != 1:
                 self._given[name] = np.delete(given, gone[gone < len(given)])
@@ -299,7 +299,7 @@ class Slots(Arrays):
         self._take_rare(changed=False)
 
     def edited(self, state: State) -> Array:
-        """(n,) slots of particles that the user has moved or changed since they fell asleep."""
+        """(n,) rows of particles that the user has moved or changed since they fell asleep."""
         known = len(self)
         rows = state.shown["velocity"][:known] != 0
         written = rows[:, 0] | rows[:, 1] | (state.shown["spin"][:known] != 0)
@@ -331,8 +331,8 @@ class Slots(Arrays):
     def in_users_order(self) -> State:
         """A state with the current positions, velocities, spins, radii, masses, categories and masks."""
         state, names = State(self.dtype), (*ROWS, "spin", "radius", "mass", "inertia", "category", "mask")
-        state._key, state.seam, state.room = self.key, self.seam, self.room
-        order = self.slots_of(np.arange(len(self)))
+        state._key, state.periodic, state.boundary = self.key, self.periodic, self.boundary
+        order = self.sorted_index(np.arange(len(self)))
         for name, column in state.arrays():  # other columns are those of new particles
             value = np.asarray(DEFAULTS.get(name, 0), column.dtype)
             blank = np.broadcast_to(value, (len(self), *column.shape[1:]))
@@ -343,7 +343,7 @@ class Slots(Arrays):
         return state
 
     def reorder(self, order: Array) -> None:
-        """Move the particle of slot order[k] to slot k."""
+        """Move the particle of row order[k] to row k."""
         spare = memory.empty(self.position.shape, self.dtype)
         for name in ROWS:
             old = getattr(self, name)
@@ -354,7 +354,7 @@ class Slots(Arrays):
         for name in (*COLUMNS, *MARKS, "inverse_mass", "particle", *_REMEMBERED, "placed"):
             if name not in alike and len(column := getattr(self, name)):
                 setattr(self, name, memory.taken(column, order))
-        self._slot_of = self._asleep = self._free = None
+        self._sorted_index = self._asleep = self._free = None
 
     def save(self, state: State) -> dict[str, Array]:
         """State between frames that is not in the user's arrays: the order, sleep, and whether lists are invalid."""
@@ -363,8 +363,8 @@ class Slots(Arrays):
         placed = np.ones(len(state), bool)
         placed[self.particle] = (state.shown["position"].take(self.particle, axis=0) != self.position).any(axis=1)
         placed[: len(self)] |= self._enlarged(state, len(self))
-        if (self.island >= 0).any():  # sleepers that the next frame is to wake
-            placed[self.particle] |= self.edited(state) & (self.island >= 0)
+        if len(rows := self.asleep):  # sleepers that the next frame is to wake
+            placed[self.particle[rows]] |= self.edited(state)[rows]
         return columns | {"void": np.array([void])} | ({"placed": placed} if placed.any() else {})
 
     def restore(self, saved: dict[str, Array], state: State) -> None:
@@ -384,7 +384,7 @@ class Slots(Arrays):
         if self.motion.all_finite(self.position, self.velocity):
             return -1
         found = (int(self.motion.first_non_finite(array)) for array in (self.position, self.velocity))
-        return next((int(self.particle[slot]) for slot in found if slot >= 0), -1)
+        return next((int(self.particle[sorted_index]) for sorted_index in found if sorted_index >= 0), -1)
 
     def scratch(self, number: int) -> Array:
         """An (n, 2) scratch array for use within one substep; its contents are undefined."""
@@ -392,9 +392,9 @@ class Slots(Arrays):
             self._scratch.append(np.empty_like(self.position))
         return self._scratch[number]
 
-    def slots_of(self, particles: Any) -> Any:
-        """(k,) slots of these user's particles."""
-        if self._slot_of is None:
-            self._slot_of = np.empty_like(self.particle)
-            self._slot_of[self.particle] = np.arange(len(self), dtype=self.particle.dtype)
-        return self._slot_of.take(particles)
+    def sorted_index(self, particles: Any) -> Any:
+        """(k,) rows of these user's particles."""
+        if self._sorted_index is None:
+            self._sorted_index = np.empty_like(self.particle)
+            self._sorted_index[self.particle] = np.arange(len(self), dtype=self.particle.dtype)
+        return self._sorted_index.take(particles)

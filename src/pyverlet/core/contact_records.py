@@ -7,15 +7,15 @@ import cython
 from cython.cimports.libc.math import INFINITY, sqrt
 from cython.cimports.libc.stdint import int32_t, int64_t
 
+from pyverlet.core.contact_recording import ABOUT, GIVE_X, GIVE_Y, NORMAL_X, NORMAL_Y, PAIR, PUSHES, ROW, TANGENT, WALL
 from pyverlet.core.kernels import kernel
-from pyverlet.core.noting import ABOUT, GIVE_X, GIVE_Y, NORMAL_X, NORMAL_Y, NOTED, PAIR, PUSHES, RUBS, WALL
 from pyverlet.core.obstacles import BODY_OF, LATE, LENGTH, ROUNDING, SEGMENT
 from pyverlet.core.periodic import nearest_in_double, wrapped_in_double
 from pyverlet.core.step import CAGE, Step
 from pyverlet.core.surface_rows import SIDES
 
-TOUCHES = cython.declare(cython.int, 12)
-"""Numbers of 64 bits of a record: see `laws.touches.TOUCH`."""
+RECORD_COLUMNS = cython.declare(cython.int, 12)
+"""Numbers of 64 bits of a record: see `laws.contact_records.CONTACT_RECORD`."""
 
 
 @kernel
@@ -25,7 +25,7 @@ def see_side(
     """Write the distance of particle i from a side of the room, m, and the normal out of the particle (2), from place `at` on."""
     x: cython.double = w.position[2 * i]
     y: cython.double = w.position[2 * i + 1]
-    if w.room == CAGE:
+    if w.boundary == CAGE:
         x -= w.x0
         y -= w.y0
         far: cython.double = sqrt(x * x + y * y)
@@ -62,11 +62,11 @@ def see_segment(
 
 
 @kernel
-def see_noted(
+def locate_records(
     w: cython.pointer(Step), place: cython.pointer(int32_t), count: cython.Py_ssize_t, key: cython.pointer(int64_t),
     row: cython.p_double, bodies: int64_t,
 ) -> cython.void:  # fmt: skip
-    """Locate the surfaces of these rows. place: set to the slot of each user's index; bodies: number of obstacles."""
+    """Locate the surfaces of these rows. place: set to the row of each user's index; bodies: number of obstacles."""
     i: cython.Py_ssize_t
     n: cython.Py_ssize_t
     for i in range(w.count):
@@ -74,7 +74,7 @@ def see_noted(
     for n in range(count):
         if key[n] & PAIR:
             continue
-        at: cython.Py_ssize_t = NOTED * n
+        at: cython.Py_ssize_t = ROW * n
         whose: int64_t = key[n] >> 33
         surface: int64_t = cython.cast(int64_t, row[at + ABOUT])
         if surface < SIDES:
@@ -84,8 +84,8 @@ def see_noted(
             see_segment(w, place[whose], surface - SIDES, row, at + ABOUT)
             key[n] = (whose << 33) + cython.cast(int64_t, w.segment[SEGMENT * (surface - SIDES) + BODY_OF]) % bodies
         if row[at + GIVE_X] != row[at + GIVE_X]:
-            row[at + GIVE_X] = row[at + RUBS] * row[at + NORMAL_Y] - row[at + PUSHES] * row[at + NORMAL_X]
-            row[at + GIVE_Y] = -row[at + RUBS] * row[at + NORMAL_X] - row[at + PUSHES] * row[at + NORMAL_Y]
+            row[at + GIVE_X] = row[at + TANGENT] * row[at + NORMAL_Y] - row[at + PUSHES] * row[at + NORMAL_X]
+            row[at + GIVE_Y] = -row[at + TANGENT] * row[at + NORMAL_X] - row[at + PUSHES] * row[at + NORMAL_Y]
 
 
 @kernel
@@ -99,11 +99,11 @@ def add_row(row: cython.p_double, to: cython.Py_ssize_t, more: cython.Py_ssize_t
     if row[more + ABOUT] < row[to + ABOUT]:
         row[to + ABOUT], row[to + NORMAL_X], row[to + NORMAL_Y] = row[more + ABOUT], row[more + NORMAL_X], row[more + NORMAL_Y]
     row[to + PUSHES] = -row[to + GIVE_X] * row[to + NORMAL_X] - row[to + GIVE_Y] * row[to + NORMAL_Y]
-    row[to + RUBS] = row[to + GIVE_X] * row[to + NORMAL_Y] - row[to + GIVE_Y] * row[to + NORMAL_X]
+    row[to + TANGENT] = row[to + GIVE_X] * row[to + NORMAL_Y] - row[to + GIVE_Y] * row[to + NORMAL_X]
 
 
 @kernel
-def sort_noted(
+def sort_records(
     w: cython.pointer(Step), start: cython.pointer(int32_t), count: cython.Py_ssize_t, key: cython.pointer(int64_t),
     row: cython.p_double, order: cython.pointer(int64_t),
 ) -> cython.Py_ssize_t:  # fmt: skip
@@ -129,7 +129,7 @@ def sort_noted(
         while at > 0 and key[order[at - 1]] > key[which]:  # a particle has few contacts
             at -= 1
         if at > 0 and key[order[at - 1]] == key[which]:
-            add_row(row, NOTED * order[at - 1], NOTED * which, (key[which] & PAIR) != 0)
+            add_row(row, ROW * order[at - 1], ROW * which, (key[which] & PAIR) != 0)
             continue
         for k in range(kept, at, -1):
             order[k] = order[k - 1]
@@ -151,19 +151,19 @@ def see_pair(
     x /= max(far, 1e-300)
     y /= max(far, 1e-300)
     if row[at + GIVE_X] != row[at + GIVE_X]:
-        row[at + GIVE_X] = row[at + PUSHES] * x + row[at + RUBS] * y
-        row[at + GIVE_Y] = row[at + PUSHES] * y - row[at + RUBS] * x
+        row[at + GIVE_X] = row[at + PUSHES] * x + row[at + TANGENT] * y
+        row[at + GIVE_Y] = row[at + PUSHES] * y - row[at + TANGENT] * x
         row[at + ABOUT] = row[at + PUSHES] * far
     else:
         row[at + PUSHES] = row[at + GIVE_X] * x + row[at + GIVE_Y] * y
-        row[at + RUBS] = row[at + GIVE_X] * y - row[at + GIVE_Y] * x
+        row[at + TANGENT] = row[at + GIVE_X] * y - row[at + GIVE_Y] * x
     row[at + NORMAL_X], row[at + NORMAL_Y] = x, y
     radius: cython.double = w.radius[i]
     return radius + 0.5 * (far - radius - w.radius[j])
 
 
 @kernel
-def write_touches(
+def write_records(
     w: cython.pointer(Step), place: cython.pointer(int32_t), count: cython.Py_ssize_t, key: cython.pointer(int64_t),
     row: cython.p_double, order: cython.pointer(int64_t), number: cython.pointer[cython.const[int64_t]],
     whole: cython.pointer(int64_t), value: cython.p_double,
@@ -176,22 +176,22 @@ def write_touches(
     n: cython.Py_ssize_t
     for n in range(count):
         which: int64_t = key[order[n]]
-        at: cython.Py_ssize_t = NOTED * order[n]
+        at: cython.Py_ssize_t = ROW * order[n]
         pair: cython.bint = (which & PAIR) != 0
         wall: cython.bint = not pair and (which & WALL) != 0
         a: int64_t = which >> 33
         b: int64_t = which & (PAIR - 1)
         i: cython.Py_ssize_t = place[a]
         far: cython.double = see_pair(w, i, place[b], row, at) if pair else row[at + ABOUT]
-        if row[at + PUSHES] == 0 and row[at + RUBS] == 0:
+        if row[at + PUSHES] == 0 and row[at + TANGENT] == 0:
             continue
-        to: cython.Py_ssize_t = TOUCHES * m
+        to: cython.Py_ssize_t = RECORD_COLUMNS * m
         whole[to], whole[to + 1] = a, b if pair else -1
         whole[to + 2], whole[to + 3] = b - WALL if wall else -1, -1 if pair or wall else b
         value[to + 4] = wrapped_in_double(w.position[2 * i] + far * row[at + NORMAL_X], w.cells.low_x, w.cells.period_x)
         value[to + 5] = wrapped_in_double(w.position[2 * i + 1] + far * row[at + NORMAL_Y], w.cells.low_y, w.cells.period_y)
         value[to + 6], value[to + 7] = row[at + NORMAL_X], row[at + NORMAL_Y]
-        value[to + 8], value[to + 9] = row[at + PUSHES], row[at + RUBS] if pair else 0 - row[at + RUBS]
+        value[to + 8], value[to + 9] = row[at + PUSHES], row[at + TANGENT] if pair else 0 - row[at + TANGENT]
         whole[to + 10], whole[to + 11] = number[a], number[b] if pair else -1
         m += 1
     return m

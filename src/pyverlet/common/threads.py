@@ -3,7 +3,7 @@
 import os
 from functools import cache
 
-from pyverlet.ground.errors import InputError
+from pyverlet.common.errors import InputError
 
 
 @cache

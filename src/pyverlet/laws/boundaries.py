@@ -13,15 +13,16 @@ from typing import Any, Unpack
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from pyverlet.ground import checks
-from pyverlet.ground.arrays import Array
-from pyverlet.ground.checked import Checked, Value
-from pyverlet.ground.constants import STANDS_OUT
-from pyverlet.ground.errors import InputError
+from pyverlet.common import checks
+from pyverlet.common.arrays import Array
+from pyverlet.common.checked import Checked, Value
+from pyverlet.common.constants import STANDS_OUT
+from pyverlet.common.errors import InputError
+from pyverlet.common.renamed import Renamed
 from pyverlet.laws.surface import Made, Surface
-from pyverlet.state.seam import NONE, Seam
-from pyverlet.state.slots import Slots
-from pyverlet.state.state import EVERYONE, meet
+from pyverlet.state.periodicity import NONE, Periodicity
+from pyverlet.state.sorted_state import SortedState
+from pyverlet.state.state import EVERYONE, may_collide
 
 Extent = tuple[float, float, float, float]
 
@@ -30,13 +31,14 @@ class Boundary(ABC):
     """Base class of rooms.
 
     Attributes:
-        seam: the periodicity of the room; none by default.
+        periodic: the periodicity of the room; none by default.
     """
 
-    seam: Seam = NONE
+    periodic: Periodicity = NONE
+    seam: Any = Renamed("periodic")
 
     @abstractmethod
-    def confine(self, state: Slots, h: float, lag: float, rest_speed: float) -> None:
+    def confine(self, state: SortedState, h: float, lag: float, rest_speed: float) -> None:
         """After a substep of h seconds, bounce or hold every circle that reaches beyond a wall.
 
         The core handles the rooms of this module itself, unless a derived class has its own `confine`.
@@ -90,7 +92,7 @@ class Boundary(ABC):
 class Open(Boundary):
     """No walls."""
 
-    def confine(self, state: Slots, h: float, lag: float, rest_speed: float) -> None:
+    def confine(self, state: SortedState, h: float, lag: float, rest_speed: float) -> None:
         pass
 
     def extent(self) -> None:
@@ -110,9 +112,9 @@ class _Walls(Surface, Boundary):
     """Base class of rooms with walls."""
 
     def holds(self, category: ArrayLike, mask: ArrayLike) -> NDArray[np.bool_]:
-        return meet(category, mask, self.category, self.mask)
+        return may_collide(category, mask, self.category, self.mask)
 
-    def _bodies(self, state: Slots) -> tuple[tuple[Array, ...], Array, Array]:
+    def _bodies(self, state: SortedState) -> tuple[tuple[Array, ...], Array, Array]:
         """Arguments of `core.own_walls`; circles that the walls do not hold count as pinned."""
         moving = state.position, state.velocity, state.acceleration, state.spin
         about = state.radius, np.ascontiguousarray(state.restitution), np.ascontiguousarray(state.friction)
@@ -130,7 +132,7 @@ class _Walls(Surface, Boundary):
         return h, lag, self.restitution, self.friction, belt, rest_speed
 
 
-def held_by(room: Boundary, state: Slots) -> Array:
+def held_by(room: Boundary, state: SortedState) -> Array:
     """(n,) inverse masses, 1/kg, 0 for particles that the walls of a room do not hold."""
     marks = (state.category, state.mask) if len(state.category) else (1, EVERYONE)
     return np.where(room.holds(*marks), state.inverse_mass, state.real(0))
@@ -165,7 +167,7 @@ class Circle(_Walls):
     def moves(self) -> bool:
         return self.angular_velocity != 0.0 and self.friction > 0.0
 
-    def confine(self, state: Slots, h: float, lag: float, rest_speed: float) -> None:
+    def confine(self, state: SortedState, h: float, lag: float, rest_speed: float) -> None:
         law = self._law(h, lag, rest_speed, self.angular_velocity * self.radius)
         state.motion.confine_to_circle(*self.center, self.radius, *self._bodies(state), law)
 
@@ -204,7 +206,7 @@ class _Side(Checked[Value]):
     """A corner of a rectangle, above and to the right of the lower one; fixed if the room is periodic."""
 
     def __set__(self, owner: Any, value: Any) -> None:
-        if owner.seam:
+        if owner.periodic:
             room = "world.boundary = pyverlet.Periodic(...)"
             raise InputError(f"{self._name} of a periodic room cannot be set; allowed is another room, {room}")
         given = vars(owner) | {self._name: self._check(self._name, value, **self._how)}
@@ -229,7 +231,7 @@ class _Rectangle(_Walls):
         """Its walls; infinitely far away where it has none."""
         return self.extent()
 
-    def confine(self, state: Slots, h: float, lag: float, rest_speed: float) -> None:
+    def confine(self, state: SortedState, h: float, lag: float, rest_speed: float) -> None:
         state.motion.confine_to_box(*self._box, *self._bodies(state), self._law(h, lag, rest_speed))
 
     def facing(self, position: Array) -> tuple[Array, Array] | None:
@@ -247,7 +249,7 @@ class _Rectangle(_Walls):
         return np.asarray(~inside.all(axis=1))
 
     def put_in(self, position: Array, radius: Array) -> Array:
-        low, high, where = self._box[:2], self._box[2:], self.seam.wrapped(np.ascontiguousarray(position))
+        low, high, where = self._box[:2], self._box[2:], self.periodic.wrapped(np.ascontiguousarray(position))
         inside = np.clip(where, low + radius[:, None], high - radius[:, None])
         out = np.abs(inside - where) > STANDS_OUT * radius[:, None]
         return np.where(out, inside.astype(position.dtype), where)
@@ -306,7 +308,7 @@ class Periodic(_Rectangle):
         super().__init__(lower, upper, **walls)
         self.axes = axes
         (x0, y0), (x1, y1) = self.lower, self.upper
-        self.seam = Seam(x0, y0, x1 - x0 if "x" in axes else 0.0, y1 - y0 if "y" in axes else 0.0)
+        self.periodic = Periodicity(x0, y0, x1 - x0 if "x" in axes else 0.0, y1 - y0 if "y" in axes else 0.0)
 
     @property
     def _box(self) -> Extent:
@@ -318,10 +320,10 @@ class Periodic(_Rectangle):
 
     def perimeter(self) -> float | None:
         """Length of its walls, m; None without any."""
-        return {"x": 2 * self.seam.period_x, "y": 2 * self.seam.period_y, "xy": None}[self.axes]
+        return {"x": 2 * self.periodic.period_x, "y": 2 * self.periodic.period_y, "xy": None}[self.axes]
 
     def check(self, radius: Array) -> None:
-        quarter = 0.25 * self.seam.shortest
+        quarter = 0.25 * self.periodic.shortest
         _fits(radius, quarter, f"a quarter of the room's period, {quarter:g} m")
         if self.axes != "xy":
             half = 0.5 * (self.upper[1] - self.lower[1] if self.axes == "x" else self.upper[0] - self.lower[0])

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from pyverlet.ground.errors import InputError
+from pyverlet.common.errors import InputError
 
 LARGEST = 1024  # pixels: larger pictures are reduced; no heap has as many circles side by side
 

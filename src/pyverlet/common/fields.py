@@ -6,8 +6,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import DTypeLike
 
-from pyverlet.ground.arrays import Array
-from pyverlet.ground.errors import InputError
+from pyverlet.common.arrays import Array
+from pyverlet.common.errors import InputError
 
 
 @dataclass(frozen=True)

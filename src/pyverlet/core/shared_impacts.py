@@ -1,7 +1,7 @@
 # mypy: ignore-errors
 """Impacts on linked particles act on everything that rigid links join to them: afterwards the normal velocity is -e times before.
 
-A single impact gives (1 + e) v_n over the inverse mass of its two particles alone. Links then pass it on (`core.link_blows`),
+A single impact gives (1 + e) v_n over the inverse mass of its two particles alone. Links then pass it on (`core.link_impacts`),
 which left an elastic dumb-bell with half its energy. So the missing impulse is applied and passed on again, until the velocity
 is right. The law holds for velocities that links allow: v_n excludes what links will remove from it along themselves, because
 velocities in the middle of a substep contain half of a substep's link forces.
@@ -15,47 +15,47 @@ from cython.cimports.libc.math import fabs, sqrt
 from cython.cimports.team import team_stage
 
 from pyverlet.core.cells import BLOCK
-from pyverlet.core.hearing import hear_more
-from pyverlet.core.impacts import Meeting, meeting, strike
+from pyverlet.core.event_recording import record_more
+from pyverlet.core.impacts import PairMotion, pair_motion, strike
 from pyverlet.core.kernels import inlined, kernel
 from pyverlet.core.link_arrays import Links
-from pyverlet.core.link_blows import (
-    begin_blow_rows,
-    end_blow_rows,
+from pyverlet.core.link_impacts import (
+    begin_impact_rows,
     end_former_rows,
-    forget_blows,
-    keep_blows,
+    end_impact_rows,
+    forget_impacts,
+    keep_impacts,
     point_rows,
-    put_blows,
     put_former,
+    put_impacts,
     share_field,
     spread_chunk,
-    take_blows,
     take_former,
-    take_kept_blows,
+    take_impacts,
+    take_kept_impacts,
     take_times,
 )
 from pyverlet.core.links import blocks_of, each_colour
 from pyverlet.core.pair_groups import each_group
 from pyverlet.core.rebounds import (
-    BLOW,
-    BLOW_WAY,
     FIRST_LACK,
     GOOD,
+    IMPACT,
+    IMPACT_WAY,
     LACK_LESS,
     MEASURE_GAIN,
     REBOUND,
+    STAMP,
     STRIKE_MORE,
     STRUCK_AT,
-    TAKE_ALL_BACK,
-    VOLLEY,
+    UNDO_ALL,
     WAY_OUT,
     advance_row,
     node_of,
     take_aim,
 )
 from pyverlet.core.step import Step
-from pyverlet.core.surfaces import note_surface
+from pyverlet.core.surfaces import add_surface_impulse
 
 MOST_STRIKES = cython.declare(cython.int, 16)
 MOST_STEP = cython.declare(cython.double, 32)
@@ -85,11 +85,11 @@ def taken_along(
     """The part of particle i's velocity before impacts that links remove, along the normal of a row."""
     if node_of(w, i) < 0:
         return 0.0
-    return w.blow[BLOW * i + 2] * row[at + WAY_OUT] + w.blow[BLOW * i + 3] * row[at + WAY_OUT + 1]
+    return w.impact[IMPACT * i + 2] * row[at + WAY_OUT] + w.impact[IMPACT * i + 3] * row[at + WAY_OUT + 1]
 
 
 @inlined
-def lent_along(
+def warm_along(
     w: cython.pointer(Step), i: cython.Py_ssize_t, row: cython.pointer(cython.double), at: cython.Py_ssize_t
 ) -> cython.double:
     """Change of velocity at the time of impact by the impulses of links in the last substep, applied as an acceleration."""
@@ -135,11 +135,11 @@ def aim_surfaces(what: cython.p_void, block: cython.int) -> cython.void:
         for c in range(w.contact_begin[i], w.contact_end[i] if node_of(w, i) >= 0 else w.contact_begin[i]):
             row: cython.pointer(cython.double) = w.surface_rebound
             at: cython.Py_ssize_t = REBOUND * c
-            if row[at + VOLLEY] == w.volley:
+            if row[at + STAMP] == w.stamp:
                 taken: cython.double = taken_along(w, i, row, at)
-                take_aim(row, at, speed_out(w, i, row, at), taken, lent_along(w, i, row, at), w.link_table.warm)
+                take_aim(row, at, speed_out(w, i, row, at), taken, warm_along(w, i, row, at), w.link_table.warm)
                 row[at + STRUCK_AT] = w.link_table.struck[node_of(w, i)]
-                row[at + BLOW_WAY], row[at + BLOW_WAY + 1] = row[at + WAY_OUT], row[at + WAY_OUT + 1]
+                row[at + IMPACT_WAY], row[at + IMPACT_WAY + 1] = row[at + WAY_OUT], row[at + WAY_OUT + 1]
 
 
 @kernel
@@ -156,16 +156,16 @@ def aim_pairs(what: cython.p_void, item: cython.int) -> cython.void:
         at: cython.Py_ssize_t = REBOUND * k
         speed: cython.double = speed_out(w, j, row, at) - speed_out(w, i, row, at)
         taken: cython.double = taken_along(w, j, row, at) - taken_along(w, i, row, at)
-        take_aim(row, at, speed, taken, lent_along(w, j, row, at) - lent_along(w, i, row, at), w.link_table.warm)
+        take_aim(row, at, speed, taken, warm_along(w, j, row, at) - warm_along(w, i, row, at), w.link_table.warm)
 
-        now: Meeting = meeting(w, k)
+        now: PairMotion = pair_motion(w, k)
         when: cython.double = max(struck_at(w, i), struck_at(w, j))
         x: cython.double = now.px + now.ux * when
         y: cython.double = now.py + now.uy * when
         distance: cython.double = sqrt(x * x + y * y)
         row[at + STRUCK_AT] = when
-        row[at + BLOW_WAY] = x / distance if distance > 0 else row[at + WAY_OUT]
-        row[at + BLOW_WAY + 1] = y / distance if distance > 0 else row[at + WAY_OUT + 1]
+        row[at + IMPACT_WAY] = x / distance if distance > 0 else row[at + WAY_OUT]
+        row[at + IMPACT_WAY + 1] = y / distance if distance > 0 else row[at + WAY_OUT + 1]
 
 
 @kernel
@@ -180,12 +180,12 @@ def advance_surfaces(what: cython.p_void, block: cython.int) -> cython.void:
         for c in range(w.contact_begin[i], w.contact_end[i] if node_of(w, i) >= 0 else w.contact_begin[i]):
             row: cython.pointer(cython.double) = w.surface_rebound
             at: cython.Py_ssize_t = REBOUND * c
-            if row[at + VOLLEY] == w.volley:
+            if row[at + STAMP] == w.stamp:
                 more: cython.double = advance_row(w, row, at, speed_out(w, i, row, at), 1 / w.inverse_mass[i], part)
                 if more != 0:
-                    strike(w, i, more * row[at + BLOW_WAY], more * row[at + BLOW_WAY + 1], 0, row[at + STRUCK_AT])
-                    note_surface(w, i, c, more, 0, -row[at + BLOW_WAY], -row[at + BLOW_WAY + 1], True)
-                    hear_more(w, c, more)
+                    strike(w, i, more * row[at + IMPACT_WAY], more * row[at + IMPACT_WAY + 1], 0, row[at + STRUCK_AT])
+                    add_surface_impulse(w, i, c, more, 0, -row[at + IMPACT_WAY], -row[at + IMPACT_WAY + 1], True)
+                    record_more(w, c, more)
 
 
 @kernel
@@ -205,14 +205,14 @@ def advance_pairs(what: cython.p_void, item: cython.int) -> cython.void:
         inverse += w.inverse_mass[j]
         more: cython.double = advance_row(w, row, at, speed_out(w, j, row, at) - speed_out(w, i, row, at), 1 / inverse, s)
         if more != 0:
-            x: cython.double = more * row[at + BLOW_WAY]
-            y: cython.double = more * row[at + BLOW_WAY + 1]
+            x: cython.double = more * row[at + IMPACT_WAY]
+            y: cython.double = more * row[at + IMPACT_WAY + 1]
             part: cython.double = w.share[k * w.varied]
-            if w.noting:
-                w.noted_x[k] += cython.cast(real, x)
-                w.noted_y[k] += cython.cast(real, y)
-                w.noted_virial[k] += cython.cast(real, more * w.reach[k * w.sized])
-            if w.listening:
+            if w.records_contacts:
+                w.summed_x[k] += cython.cast(real, x)
+                w.summed_y[k] += cython.cast(real, y)
+                w.summed_virial[k] += cython.cast(real, more * w.reach[k * w.sized])
+            if w.records_events:
                 w.pressed[k] += cython.cast(real, more)
             strike(w, i, -x * part, -y * part, 0, row[at + STRUCK_AT])
             strike(w, j, x * (1 - part), y * (1 - part), 0, row[at + STRUCK_AT])
@@ -238,9 +238,9 @@ def sum_of(w: cython.pointer(Step), blocks: cython.int, which: cython.int) -> cy
 @kernel
 def hand_on(w: cython.pointer(Step), nodes: cython.int, sweeps: cython.int) -> cython.void:
     """Pass the velocity changes by impacts on through links."""
-    team_stage(w.team, take_blows, w, nodes)
+    team_stage(w.team, take_impacts, w, nodes)
     share_field(w, sweeps)
-    team_stage(w.team, put_blows, w, nodes)
+    team_stage(w.team, put_impacts, w, nodes)
 
 
 @kernel
@@ -255,7 +255,7 @@ def strike_again(w: cython.pointer(Step), blocks: cython.int, nodes: cython.int,
     if first <= good:
         return
     least: cython.double = first
-    team_stage(w.team, keep_blows, w, nodes)
+    team_stage(w.team, keep_impacts, w, nodes)
     w.rebound_step, w.rebound_turn = 1, 0
     for _ in range(MOST_STRIKES):
         advance(w, blocks, STRIKE_MORE)
@@ -270,9 +270,9 @@ def strike_again(w: cython.pointer(Step), blocks: cython.int, nodes: cython.int,
         if left <= good or w.rebound_step == 0:
             break
         if not left < WORST * least:
-            advance(w, blocks, TAKE_ALL_BACK)
-            team_stage(w.team, take_kept_blows, w, nodes)
-            team_stage(w.team, put_blows, w, nodes)
+            advance(w, blocks, UNDO_ALL)
+            team_stage(w.team, take_kept_impacts, w, nodes)
+            team_stage(w.team, put_impacts, w, nodes)
             return
         least = min(least, left)
         w.rebound_turn = left / lacks
@@ -294,9 +294,9 @@ def any_rebound(w: cython.pointer(Step), blocks: cython.int) -> cython.bint:
 
 
 @kernel
-def begin_volley(w: cython.pointer(Step), blocks: cython.int) -> cython.void:
+def begin_impacts(w: cython.pointer(Step), blocks: cython.int) -> cython.void:
     """Discard the records of impacts."""
-    w.volley += 1
+    w.stamp += 1
     for b in range(blocks):
         w.rebounds[b] = 0
     for b in range(w.groups):
@@ -304,7 +304,7 @@ def begin_volley(w: cython.pointer(Step), blocks: cython.int) -> cython.void:
 
 
 @kernel
-def share_blows(w: cython.pointer(Step), blocks: cython.int) -> cython.void:
+def share_impacts(w: cython.pointer(Step), blocks: cython.int) -> cython.void:
     """After impacts and before links are solved: distribute impacts over everything joined by links."""
     k: cython.pointer(Links) = w.link_table
     nodes: cython.int = blocks_of(k)
@@ -313,7 +313,7 @@ def share_blows(w: cython.pointer(Step), blocks: cython.int) -> cython.void:
     n: cython.int
     if not any_rebound(w, blocks):
         return
-    team_stage(w.team, begin_blow_rows, w, chunks)
+    team_stage(w.team, begin_impact_rows, w, chunks)
     team_stage(w.team, take_times, w, nodes)
     for n in range(sweeps + 1):
         each_colour(w, spread_chunk, n % 2 == 1)
@@ -328,6 +328,6 @@ def share_blows(w: cython.pointer(Step), blocks: cython.int) -> cython.void:
     each_group(w, aim_pairs)
     hand_on(w, nodes, sweeps)
     strike_again(w, blocks, nodes, sweeps)
-    team_stage(w.team, end_blow_rows, w, chunks)
-    team_stage(w.team, forget_blows, w, nodes)
-    begin_volley(w, blocks)
+    team_stage(w.team, end_impact_rows, w, chunks)
+    team_stage(w.team, forget_impacts, w, nodes)
+    begin_impacts(w, blocks)

@@ -15,7 +15,7 @@ except ImportError:
 _CTRL_C = int(signal.SIGINT)
 
 
-class _Whole:
+class _WithoutInterrupts:
     """A context that delays Ctrl-C, with little overhead. Threads other than the main one receive no signals."""
 
     def __init__(self) -> None:
@@ -52,7 +52,7 @@ class _Whole:
             self._pressed = number, frame
 
 
-whole = _Whole()
+without_interrupts = _WithoutInterrupts()
 
 
 @contextmanager

@@ -10,7 +10,7 @@ from tests.worlds import FRAME
 import pyverlet as pv
 from pyverlet.laws.integrators import BY_NAME
 from pyverlet.world import core_arrays
-from pyverlet.world.moments import Moment
+from pyverlet.world.substep_snapshot import SubstepSnapshot
 
 
 def in_users_order(rows: NDArray[Any], whose: NDArray[Any]) -> NDArray[Any]:
@@ -20,19 +20,19 @@ def in_users_order(rows: NDArray[Any], whose: NDArray[Any]) -> NDArray[Any]:
 
 
 class Looks:
-    """An onlooker that keeps what it sees: time, positions and velocities in the user's order."""
+    """An observer that keeps what it sees: time, positions and velocities in the user's order."""
 
     def __init__(self) -> None:
         self.seen: list[tuple[float, NDArray[Any], NDArray[Any]]] = []
 
-    def __call__(self, moment: Moment) -> None:
-        position, velocity, whose = moment.look()
-        assert len(moment) == len(whose)
-        rows, same = moment.positions()
+    def __call__(self, snapshot: SubstepSnapshot) -> None:
+        position, velocity, whose = snapshot.look()
+        assert len(snapshot) == len(whose)
+        rows, same = snapshot.positions()
         assert (rows == position).all()
         assert same is whose
         assert not np.shares_memory(rows, position)
-        self.seen.append((moment.time, in_users_order(position, whose), in_users_order(velocity, whose)))
+        self.seen.append((snapshot.time, in_users_order(position, whose), in_users_order(velocity, whose)))
 
 
 @pytest.mark.parametrize("name", [name for name, kind in BY_NAME.items() if kind.order >= 2])
@@ -42,7 +42,7 @@ def test_circles_in_free_fall_are_where_the_closed_form_says(name: str) -> None:
     x0, v0 = rng.uniform(-50, 50, (300, 2)), rng.uniform(-5, 5, (300, 2))
     world = pv.World(integrator=BY_NAME[name](), collisions=None, dtype=np.float64)
     world.add(position=x0, radius=0.1).velocity[:] = v0
-    world.onlooker = looks = Looks()
+    world.observer = looks = Looks()
     world.run(seconds=3 * FRAME, dt=FRAME)
     assert [round(t / (FRAME / 8), 6) for t, _, _ in looks.seen] == [k for k in range(24) if k % 8]
     g = np.array(world.gravity)
@@ -64,9 +64,9 @@ def test_a_look_is_what_a_shorter_frame_would_end_with() -> None:
     world = falling_heap()
     world.run(seconds=0.5, dt=FRAME)
     saved = world.save()
-    world.onlooker = looks = Looks()
+    world.observer = looks = Looks()
     world.step(FRAME)
-    world.onlooker = None
+    world.observer = None
     for done, (time, position, _) in enumerate(looks.seen, start=1):
         world.restore(saved)
         world._substeps = done  # not as a user does it, which restarts the integrator
@@ -82,10 +82,10 @@ def test_what_was_seen_stays_as_it_was(monkeypatch: pytest.MonkeyPatch) -> None:
     world = falling_heap()
     kept: list[tuple[tuple[NDArray[Any], ...], list[NDArray[Any]]]] = []
 
-    def keep(moment: Moment) -> None:
-        kept.append((moment.look(), [array.copy() for array in moment.look()]))
+    def keep(snapshot: SubstepSnapshot) -> None:
+        kept.append((snapshot.look(), [array.copy() for array in snapshot.look()]))
 
-    world.onlooker = keep
+    world.observer = keep
     world.velocity[:] = np.random.default_rng(3).normal(0, 20, (len(world), 2))
     world.run(seconds=30 / 60)
     assert any((seen[2] != kept[0][0][2]).any() for seen, _ in kept)

@@ -8,7 +8,7 @@ from typing import Any, SupportsFloat
 import numpy as np
 from numpy.typing import ArrayLike, DTypeLike, NDArray
 
-from pyverlet.ground.errors import InputError
+from pyverlet.common.errors import InputError
 
 
 def number(
@@ -34,7 +34,7 @@ def _allowed(above: float | None, least: float | None, most: float | None) -> st
     return "a finite number" + "".join(f" {text} {limit:g}" for text, limit in limits if limit is not None)
 
 
-def whole(name: str, value: Any, *, least: int = 1, most: int | None = None, most_is: str = "") -> int:
+def integer(name: str, value: Any, *, least: int = 1, most: int | None = None, most_is: str = "") -> int:
     """An int of at least `least` and at most `most` (`most_is` says where that limit comes from)."""
     allowed = f"a whole number of at least {least}"
     if most is not None:
@@ -161,7 +161,7 @@ def choice(name: str, value: Any, allowed: Sequence[str]) -> str:
 
 def bit_set(name: str, value: Any) -> int:
     """32 bits, from an integer of 0 to 2^32 - 1."""
-    return whole(name, value, least=0, most=2**32 - 1)
+    return integer(name, value, least=0, most=2**32 - 1)
 
 
 def flag(name: str, value: Any) -> bool:

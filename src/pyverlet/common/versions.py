@@ -4,7 +4,7 @@ import sys
 
 import numpy as np
 
-from pyverlet.ground import loading
+from pyverlet.common import loading
 
 LEAST, BELOW = (2, 0), (3, 0)  # first supported version of NumPy, and first that may be incompatible
 ALLOWED = "numpy>=2.0,<3.0"  # for pip

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator
 from typing import TYPE_CHECKING, Any, Generic, Self, SupportsIndex, TypeVar
 
-from pyverlet.ground.errors import InputError
+from pyverlet.common.errors import InputError
 
 Thing = TypeVar("Thing")
 Held = TypeVar("Held")

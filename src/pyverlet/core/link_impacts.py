@@ -18,15 +18,15 @@ from pyverlet.core.link_arrays import DISTANCE, MOTOR, Links
 from pyverlet.core.link_blocks import relax_row
 from pyverlet.core.link_chains import CHORDS, step_chain
 from pyverlet.core.link_shapes import LinkWay, way_between
-from pyverlet.core.link_warm_start import lend_between
+from pyverlet.core.link_warm_start import add_warm_between
 from pyverlet.core.links import each_colour
-from pyverlet.core.rebounds import BLOW
+from pyverlet.core.rebounds import IMPACT
 from pyverlet.core.step import Step
-from pyverlet.core.work import book_impact
+from pyverlet.core.work import add_impact_work
 
 
 @kernel
-def begin_blow_rows(what: cython.p_void, item: cython.int) -> cython.void:
+def begin_impact_rows(what: cython.p_void, item: cython.int) -> cython.void:
     """Save the impulses of the rows of a chunk."""
     k: cython.pointer(Links) = cython.cast(cython.pointer(Step), what).link_table
     r: cython.Py_ssize_t
@@ -43,8 +43,8 @@ def take_times(what: cython.p_void, block: cython.int) -> cython.void:
     v: cython.pointer(real) = w.motion if w.rough else w.velocity
     width: cython.Py_ssize_t = 4 if w.rough else 2
     for i in range(block * BLOCK, min((block + 1) * BLOCK, k.count)):
-        at: cython.Py_ssize_t = k.slot[i]
-        struck: cython.bint = k.own[i] > 0 and (w.blow[BLOW * at] != 0 or w.blow[BLOW * at + 1] != 0)
+        at: cython.Py_ssize_t = k.sorted_index[i]
+        struck: cython.bint = k.own[i] > 0 and (w.impact[IMPACT * at] != 0 or w.impact[IMPACT * at + 1] != 0)
         k.held[i] = -1
         k.struck[i] = w.since[at] if struck else 0.0
         k.x[2 * i], k.x[2 * i + 1] = w.position[2 * at], w.position[2 * at + 1]
@@ -74,7 +74,7 @@ def spread_chunk(what: cython.p_void, item: cython.int) -> cython.void:
         for r in range(k.block[b], k.block[b + 1]):
             if k.warm and k.kind[r] == DISTANCE and k.keeps[r] == 0 and k.ahead[3 * r] == 0:
                 k.ahead[3 * r], k.ahead[3 * r + 1], k.ahead[3 * r + 2] = k.saved[r], k.had[2 * r], k.had[2 * r + 1]
-                lend_between(k, r, -k.had[2 * r], -k.had[2 * r + 1])
+                add_warm_between(k, r, -k.had[2 * r], -k.had[2 * r + 1])
 
 
 @kernel
@@ -113,12 +113,12 @@ def end_former_rows(what: cython.p_void, item: cython.int) -> cython.void:
 
 
 @kernel
-def end_blow_rows(what: cython.p_void, item: cython.int) -> cython.void:
+def end_impact_rows(what: cython.p_void, item: cython.int) -> cython.void:
     """Book the impulses by impacts: they are no load, but count for breaking."""
     k: cython.pointer(Links) = cython.cast(cython.pointer(Step), what).link_table
     r: cython.Py_ssize_t
     for r in range(k.block[k.chunk[item]], k.block[k.chunk[item + 1]]):
-        k.blow[r] += k.impulse[r] - k.saved[r]
+        k.impact[r] += k.impulse[r] - k.saved[r]
         restore_row(k, r)
 
 
@@ -128,9 +128,9 @@ def take_former(what: cython.p_void, block: cython.int) -> cython.void:
     w: cython.pointer(Step) = cython.cast(cython.pointer(Step), what)
     k: cython.pointer(Links) = w.link_table
     for i in range(block * BLOCK, min((block + 1) * BLOCK, k.count)):
-        at: cython.Py_ssize_t = k.slot[i]
-        k.u[2 * i] -= w.blow[BLOW * at]
-        k.u[2 * i + 1] -= w.blow[BLOW * at + 1]
+        at: cython.Py_ssize_t = k.sorted_index[i]
+        k.u[2 * i] -= w.impact[IMPACT * at]
+        k.u[2 * i + 1] -= w.impact[IMPACT * at + 1]
         k.begun[3 * i], k.begun[3 * i + 1] = k.u[2 * i], k.u[2 * i + 1]
 
 
@@ -142,11 +142,11 @@ def put_former(what: cython.p_void, block: cython.int) -> cython.void:
     v: cython.pointer(real) = w.motion if w.rough else w.velocity
     width: cython.Py_ssize_t = 4 if w.rough else 2
     for i in range(block * BLOCK, min((block + 1) * BLOCK, k.count)):
-        at: cython.Py_ssize_t = k.slot[i]
+        at: cython.Py_ssize_t = k.sorted_index[i]
         struck: cython.bint = k.struck[i] > 0
         x: cython.double = k.u[2 * i] - k.begun[3 * i] if struck else 0.0
         y: cython.double = k.u[2 * i + 1] - k.begun[3 * i + 1] if struck else 0.0
-        w.blow[BLOW * at + 2], w.blow[BLOW * at + 3] = x, y
+        w.impact[IMPACT * at + 2], w.impact[IMPACT * at + 3] = x, y
         if k.warm and struck:
             v[width * at] += cython.cast(real, x)
             v[width * at + 1] += cython.cast(real, y)
@@ -154,63 +154,63 @@ def put_former(what: cython.p_void, block: cython.int) -> cython.void:
 
 
 @kernel
-def take_blows(what: cython.p_void, block: cython.int) -> cython.void:
+def take_impacts(what: cython.p_void, block: cython.int) -> cython.void:
     """Set velocities of a block to their changes by impacts."""
     w: cython.pointer(Step) = cython.cast(cython.pointer(Step), what)
     k: cython.pointer(Links) = w.link_table
     for i in range(block * BLOCK, min((block + 1) * BLOCK, k.count)):
-        at: cython.Py_ssize_t = BLOW * cython.cast(cython.Py_ssize_t, k.slot[i])
-        k.u[2 * i], k.u[2 * i + 1] = w.blow[at], w.blow[at + 1]
+        at: cython.Py_ssize_t = IMPACT * cython.cast(cython.Py_ssize_t, k.sorted_index[i])
+        k.u[2 * i], k.u[2 * i + 1] = w.impact[at], w.impact[at + 1]
 
 
 @kernel
-def keep_blows(what: cython.p_void, block: cython.int) -> cython.void:
-    """Save the changes by impacts, for `take_kept_blows`."""
+def keep_impacts(what: cython.p_void, block: cython.int) -> cython.void:
+    """Save the changes by impacts, for `take_kept_impacts`."""
     w: cython.pointer(Step) = cython.cast(cython.pointer(Step), what)
     k: cython.pointer(Links) = w.link_table
     for i in range(block * BLOCK, min((block + 1) * BLOCK, k.count)):
-        at: cython.Py_ssize_t = BLOW * cython.cast(cython.Py_ssize_t, k.slot[i])
-        k.begun[3 * i], k.begun[3 * i + 1] = w.blow[at], w.blow[at + 1]
+        at: cython.Py_ssize_t = IMPACT * cython.cast(cython.Py_ssize_t, k.sorted_index[i])
+        k.begun[3 * i], k.begun[3 * i + 1] = w.impact[at], w.impact[at + 1]
 
 
 @kernel
-def take_kept_blows(what: cython.p_void, block: cython.int) -> cython.void:
-    """Restore the changes by impacts that `keep_blows` saved."""
+def take_kept_impacts(what: cython.p_void, block: cython.int) -> cython.void:
+    """Restore the changes by impacts that `keep_impacts` saved."""
     k: cython.pointer(Links) = cython.cast(cython.pointer(Step), what).link_table
     for i in range(block * BLOCK, min((block + 1) * BLOCK, k.count)):
         k.u[2 * i], k.u[2 * i + 1] = k.begun[3 * i], k.begun[3 * i + 1]
 
 
 @kernel
-def put_blows(what: cython.p_void, block: cython.int) -> cython.void:
+def put_impacts(what: cython.p_void, block: cython.int) -> cython.void:
     """Apply the changes by impacts after links have acted on them."""
     w: cython.pointer(Step) = cython.cast(cython.pointer(Step), what)
     k: cython.pointer(Links) = w.link_table
     v: cython.pointer(real) = w.motion if w.rough else w.velocity
     width: cython.Py_ssize_t = 4 if w.rough else 2
     for i in range(block * BLOCK, min((block + 1) * BLOCK, k.count)):
-        at: cython.Py_ssize_t = k.slot[i]
-        dx: cython.double = k.u[2 * i] - w.blow[BLOW * at]
-        dy: cython.double = k.u[2 * i + 1] - w.blow[BLOW * at + 1]
+        at: cython.Py_ssize_t = k.sorted_index[i]
+        dx: cython.double = k.u[2 * i] - w.impact[IMPACT * at]
+        dy: cython.double = k.u[2 * i + 1] - w.impact[IMPACT * at + 1]
         if k.own[i] > 0 and (dx != 0 or dy != 0):
             v[width * at] += cython.cast(real, dx)
             v[width * at + 1] += cython.cast(real, dy)
             w.free[2 * at] += cython.cast(real, dx)
             w.free[2 * at + 1] += cython.cast(real, dy)
             move_path(w, at, dx, dy, k.struck[i])
-            if w.booking:
-                book_impact(w, at, dx, dy, 0, k.struck[i])
-            w.blow[BLOW * at], w.blow[BLOW * at + 1] = k.u[2 * i], k.u[2 * i + 1]
+            if w.records_work:
+                add_impact_work(w, at, dx, dy, 0, k.struck[i])
+            w.impact[IMPACT * at], w.impact[IMPACT * at + 1] = k.u[2 * i], k.u[2 * i + 1]
 
 
 @kernel
-def forget_blows(what: cython.p_void, block: cython.int) -> cython.void:
+def forget_impacts(what: cython.p_void, block: cython.int) -> cython.void:
     """Clear the changes by impacts."""
     w: cython.pointer(Step) = cython.cast(cython.pointer(Step), what)
     k: cython.pointer(Links) = w.link_table
     for i in range(block * BLOCK, min((block + 1) * BLOCK, k.count)):
-        at: cython.Py_ssize_t = BLOW * cython.cast(cython.Py_ssize_t, k.slot[i])
-        w.blow[at] = w.blow[at + 1] = 0
+        at: cython.Py_ssize_t = IMPACT * cython.cast(cython.Py_ssize_t, k.sorted_index[i])
+        w.impact[at] = w.impact[at + 1] = 0
         k.react[2 * i] = k.react[2 * i + 1] = 0
 
 

@@ -7,12 +7,12 @@ from typing import NamedTuple
 import numpy as np
 
 from pyverlet import core
-from pyverlet.ground.arrays import Array
+from pyverlet.common.arrays import Array
 
 _HERE = np.zeros((1, 2))
 
 
-class Seam(NamedTuple):
+class Periodicity(NamedTuple):
     """A corner (x, y) of the room and its period (x, y), m; 0 along axes without one."""
 
     low_x: float = 0.0
@@ -62,4 +62,4 @@ class Seam(NamedTuple):
         core.unit("engine", position.dtype).wrap(position, *self, position)
 
 
-NONE = Seam()  # of rooms that are not periodic
+NONE = Periodicity()  # of rooms that are not periodic

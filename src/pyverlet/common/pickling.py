@@ -4,7 +4,7 @@ import sys
 from collections.abc import Callable
 from typing import Any
 
-from pyverlet.ground.errors import InputError
+from pyverlet.common.errors import InputError
 
 _BY_VALUE = {"cloudpickle", "dill"}  # packages that pickle functions by value, not by name
 

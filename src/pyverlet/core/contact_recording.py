@@ -1,8 +1,8 @@
 # mypy: ignore-errors
-"""Records impulses of contacts in a frame, while `noting`: for `World.contacts`, `force_on` and `pressure`.
+"""Records impulses of contacts in a frame, while `records_contacts`: for `World.contacts`, `force_on` and `pressure`.
 
 Lanes and surface contacts sum their impulses over substeps. The sums are converted to rows before lists are made anew, and when
-they are asked for: see `core.noted`.
+they are asked for: see `core.contact_records`.
 """
 
 from __future__ import annotations
@@ -18,13 +18,13 @@ from pyverlet.core.pair_memory import repeats
 from pyverlet.core.step import CAGE, OPEN, Step
 from pyverlet.core.surface_rows import GIVEN
 
-NOTED = cython.declare(cython.int, 7)
+ROW = cython.declare(cython.int, 7)
 """Columns of a row. Jointly computed columns are not adjacent: there GCC 12 contracts a b - c d, in spite of its flag."""
 
 GIVE_X = cython.declare(cython.int, 0)  # impulse on the second circle or surface, N s; NaN: see the next two
 PUSHES = cython.declare(cython.int, 1)  # normal part, which separates them
 GIVE_Y = cython.declare(cython.int, 2)
-RUBS = cython.declare(cython.int, 3)  # tangential part, along (n_y, -n_x)
+TANGENT = cython.declare(cython.int, 3)  # tangential part, along (n_y, -n_x)
 ABOUT = cython.declare(cython.int, 4)  # surface number, later its distance, m; of a pair the normal impulse times distance, N s m
 NORMAL_X = cython.declare(cython.int, 5)  # out of the first circle
 NORMAL_Y = cython.declare(cython.int, 6)
@@ -37,13 +37,13 @@ WALL = cython.declare(int64_t, 0x80000000)
 
 
 @kernel
-def clear_notes(w: cython.pointer(Step)) -> cython.void:
+def clear_records(w: cython.pointer(Step)) -> cython.void:
     """Clear the records: of pairs and surfaces, and of walls that stop what links pull out of the room."""
     none: real = 0
     k: cython.Py_ssize_t
-    for k in range(w.lists.lanes_room):
-        w.noted_x[k] = w.noted_y[k] = w.noted_virial[k] = none
-    for k in range(GIVEN * w.contact_room):
+    for k in range(w.lists.lanes_capacity):
+        w.summed_x[k] = w.summed_y[k] = w.summed_virial[k] = none
+    for k in range(GIVEN * w.contact_capacity):
         w.by_surface[k] = 0
     for k in range(2 * w.count):
         w.wall_given[k] = none
@@ -51,24 +51,24 @@ def clear_notes(w: cython.pointer(Step)) -> cython.void:
 
 
 @kernel
-def begin_notes(w: cython.pointer(Step)) -> cython.void:
+def begin_records(w: cython.pointer(Step)) -> cython.void:
     """Begin the records of a frame."""
-    clear_notes(w)
-    w.noted_frame += 1
+    clear_records(w)
+    w.recorded_frame += 1
 
 
 @kernel
-def note_stage(what: cython.p_void, item: cython.int) -> cython.void:
+def pair_records_stage(what: cython.p_void, item: cython.int) -> cython.void:
     """Add the impulses of a group's pairs in a substep; those of resting contacts are scaled to h."""
     w: cython.pointer(Step) = cython.cast(cython.pointer(Step), what)
     s: cython.Py_ssize_t = busy_group(w, item)
     for k in range(w.begin[s], w.begin[s] + w.lanes[s]):
         if w.impulse[k] > 0:
-            push: real = w.weigh * w.impulse[k]
-            rub: real = w.weigh * w.tangent_impulse[k] if w.rough else 0
-            w.noted_x[k] += push * w.normal_x[k] + rub * w.normal_y[k]
-            w.noted_y[k] += push * w.normal_y[k] - rub * w.normal_x[k]
-            w.noted_virial[k] += push * (w.reach[k * w.sized] - w.depth[k])
+            push: real = w.rest_scale * w.impulse[k]
+            tangent: real = w.rest_scale * w.tangent_impulse[k] if w.rough else 0
+            w.summed_x[k] += push * w.normal_x[k] + tangent * w.normal_y[k]
+            w.summed_y[k] += push * w.normal_y[k] - tangent * w.normal_x[k]
+            w.summed_virial[k] += push * (w.reach[k * w.sized] - w.depth[k])
 
 
 @kernel
@@ -78,7 +78,7 @@ def nearest_side(w: cython.pointer(Step), i: cython.Py_ssize_t) -> cython.int:
     right: cython.double = w.x1 - w.position[2 * i]
     below: cython.double = w.position[2 * i + 1] - w.y0
     above_it: cython.double = w.y1 - w.position[2 * i + 1]
-    if w.room == CAGE:
+    if w.boundary == CAGE:
         return 0
     if min(left, right) <= min(below, above_it):
         return 0 if left <= right else 1
@@ -86,17 +86,17 @@ def nearest_side(w: cython.pointer(Step), i: cython.Py_ssize_t) -> cython.int:
 
 
 @inlined
-def put_noted(
-    row: cython.p_double, at: cython.Py_ssize_t, x: cython.double, y: cython.double, push: cython.double, rub: cython.double,
+def put_record(
+    row: cython.p_double, at: cython.Py_ssize_t, x: cython.double, y: cython.double, push: cython.double, tangent: cython.double,
     about: cython.double,
 ) -> cython.void:  # fmt: skip
     """Write a row at `at`, if there is room."""
-    row[at + GIVE_X], row[at + GIVE_Y], row[at + PUSHES], row[at + RUBS], row[at + ABOUT] = x, y, push, rub, about
+    row[at + GIVE_X], row[at + GIVE_Y], row[at + PUSHES], row[at + TANGENT], row[at + ABOUT] = x, y, push, tangent, about
 
 
 @kernel
-def take_noted(
-    w: cython.pointer(Step), key: cython.pointer(int64_t), row: cython.p_double, room: cython.Py_ssize_t
+def collect_rows(
+    w: cython.pointer(Step), key: cython.pointer(int64_t), row: cython.p_double, capacity: cython.Py_ssize_t
 ) -> cython.Py_ssize_t:  # fmt: skip
     """Write rows of the records since lists were made, and their keys, as far as there is room; returns their number."""
     n: cython.Py_ssize_t = 0
@@ -104,15 +104,15 @@ def take_noted(
     mass: cython.double
     for s in range(w.groups):
         for k in range(w.begin[s], w.begin[s] + w.lanes[s]):
-            if (w.noted_x[k] != 0 or w.noted_y[k] != 0) and not repeats(w, s, k):
-                if n < room:
+            if (w.summed_x[k] != 0 or w.summed_y[k] != 0) and not repeats(w, s, k):
+                if n < capacity:
                     a: int64_t = w.lists.particle[w.i[k]]
                     b: int64_t = w.lists.particle[w.j[k]]
                     inverse: cython.double = w.inverse_mass[w.i[k]]
                     mass = 1 / (inverse + w.inverse_mass[w.j[k]])
                     way: cython.double = mass if a < b else -mass
                     key[n] = (min(a, b) << 33) + PAIR + max(a, b)
-                    put_noted(row, NOTED * n, way * w.noted_x[k], way * w.noted_y[k], 0, 0, mass * w.noted_virial[k])
+                    put_record(row, ROW * n, way * w.summed_x[k], way * w.summed_y[k], 0, 0, mass * w.summed_virial[k])
                 n += 1
     for i in range(w.count):
         if w.inverse_mass[i] == 0:
@@ -122,17 +122,17 @@ def take_noted(
         for k in range(w.contact_begin[i], w.contact_begin[i] if w.surfaces_kept else w.contact_end[i]):
             g: cython.Py_ssize_t = GIVEN * k
             push: cython.double = mass * w.by_surface[g + 2]
-            rubs: cython.double = mass * w.by_surface[g + 3]
-            if w.surface[k] >= 0 and (push != 0 or rubs != 0 or w.by_surface[g] != 0 or w.by_surface[g + 1] != 0):
-                if n < room:
+            tangent: cython.double = mass * w.by_surface[g + 3]
+            if w.surface[k] >= 0 and (push != 0 or tangent != 0 or w.by_surface[g] != 0 or w.by_surface[g + 1] != 0):
+                if n < capacity:
                     key[n] = (whose << 33) + w.surface[k]
-                    put_noted(row, NOTED * n, mass * w.by_surface[g], mass * w.by_surface[g + 1], push, rubs, w.surface[k])
+                    put_record(row, ROW * n, mass * w.by_surface[g], mass * w.by_surface[g + 1], push, tangent, w.surface[k])
                 n += 1
         x: cython.double = mass * w.wall_given[2 * i]
         y: cython.double = mass * w.wall_given[2 * i + 1]
-        if (x != 0 or y != 0) and w.room != OPEN:
-            if n < room:
+        if (x != 0 or y != 0) and w.boundary != OPEN:
+            if n < capacity:
                 key[n] = (whose << 33) + nearest_side(w, i)
-                put_noted(row, NOTED * n, x, y, sqrt(x * x + y * y), 0, nearest_side(w, i))
+                put_record(row, ROW * n, x, y, sqrt(x * x + y * y), 0, nearest_side(w, i))
             n += 1
     return n

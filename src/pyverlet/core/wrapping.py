@@ -13,7 +13,7 @@ from pyverlet.core.step import Step
 
 
 @cython.cfunc
-def follow_seam(w: cython.pointer(Step), crossed: cython.pointer(cython.double)):
+def follow_images(w: cython.pointer(Step), crossed: cython.pointer(cython.double)):
     """Move positions to the images nearest to those of the last list check; the shift back, m, is added to `crossed` (n, 2).
 
     Positions far away are wrapped into the room, since digits are lost there, and the list is made anew.
@@ -35,11 +35,11 @@ def follow_seam(w: cython.pointer(Step), crossed: cython.pointer(cython.double))
                 too_far |= far > 1.5 * period or far < -0.5 * period
     if too_far:
         w.lists.good = False
-        wrap_seam(w, crossed)
+        wrap_positions(w, crossed)
 
 
 @cython.cfunc
-def wrap_seam(w: cython.pointer(Step), crossed: cython.pointer(cython.double)):
+def wrap_positions(w: cython.pointer(Step), crossed: cython.pointer(cython.double)):
     """Wrap all positions into a periodic room; the shift back, whole periods in m, is added to `crossed` (n, 2)."""
     c: cython.pointer(Cells) = w.cells
     axis: cython.int

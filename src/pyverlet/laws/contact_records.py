@@ -1,4 +1,4 @@
-"""Contact records of the last frame, with their points and impulses: `Touches` reads them from the engine on demand.
+"""Contact records of the last frame, with their points and impulses: `ContactRecords` reads them from the engine on demand.
 
 Impulses are summed substep by substep; points and normals are those at the end of the frame.
 """
@@ -9,15 +9,15 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from pyverlet.common.arrays import Array, Floats
+from pyverlet.common.shown import Records
 from pyverlet.core import unit
-from pyverlet.ground.arrays import Array, Floats
-from pyverlet.ground.shown import Records
 from pyverlet.laws.events import renumber
 
 WALLS, PAIRS = -1, -2
 """Values instead of the number of an obstacle."""
 
-TOUCH = np.dtype(
+CONTACT_RECORD = np.dtype(
     [
         ("a", np.int64), ("b", np.int64), ("wall", np.int64), ("obstacle", np.int64), ("point", np.float64, (2,)),
         ("normal", np.float64, (2,)), ("impulse", np.float64), ("rub", np.float64), ("number", np.int64, (2,)),
@@ -39,7 +39,7 @@ class Pushes(NamedTuple):
     """(m,) rad, direction of the normal out of the first."""
 
 
-class Touches:
+class ContactRecords:
     """The contacts of the last frame. Indices are those at its end.
 
     Attributes:
@@ -51,9 +51,13 @@ class Touches:
         """engine: of the core, which records contacts from the next frame on."""
         self._engine = engine
         self._frame = 0  # frame read last
-        self._shown: list[Array] = [Records(0, TOUCH)]  # all arrays returned as its `records`
+        self._shown: list[Array] = [Records(0, CONTACT_RECORD)]  # all arrays returned as its `records`
         self.records = self._shown[0]
-        self._given = np.empty(0, np.int64), np.empty((0, 7)), np.empty(0, np.int64)  # keys, rows and order, see `core.noting`
+        self._given = (
+            np.empty(0, np.int64),
+            np.empty((0, 7)),
+            np.empty(0, np.int64),
+        )  # keys, rows and order, see `core.contact_recording`
         self.dt = np.inf
 
     def take(self, number: Array, obstacles: int, sleepers: tuple[Array, Floats] | None = None) -> None:
@@ -64,12 +68,12 @@ class Touches:
         found = self._engine.contact_records(self._frame, number, max(obstacles, 1), sleepers)
         if found is not None:
             self._frame, records, self._given = found
-            self.records = Records(len(records), TOUCH, records)
+            self.records = Records(len(records), CONTACT_RECORD, records)
             self._shown = [self.records]
 
     def prepare(self, number: Array) -> None:
         """Run the code of `take` once before the first frame, so that the first query is not delayed."""
-        Records(0, TOUCH, self._engine.contact_records(0, number, 1, None)[1])
+        Records(0, CONTACT_RECORD, self._engine.contact_records(0, number, 1, None)[1])
 
     def renumber(self, now: Array) -> None:
         """Renumber particles in the returned arrays of this frame: now at `now` (n,), or removed (-1)."""
@@ -109,9 +113,9 @@ class Touches:
         between = found["number"][:, 1] >= 0
         pairs, force, angle = [found["number"][between]], [push[between]], [np.arctan2(ny, nx)[between]]
         for mine in (found["wall"] >= 0, found["obstacle"] >= 0):
-            who, where = np.unique(found["number"][mine, 0], return_inverse=True)
-            x, y = (np.bincount(where, column, len(who)) for column in against[mine].T)
-            pairs.append(np.column_stack((who, who)))
+            which, where = np.unique(found["number"][mine, 0], return_inverse=True)
+            x, y = (np.bincount(where, column, len(which)) for column in against[mine].T)
+            pairs.append(np.column_stack((which, which)))
             force.append(np.hypot(x, y))
             angle.append(np.arctan2(y, x))
         return Pushes(np.concatenate(pairs), np.concatenate(force) / self.dt, np.concatenate(angle))

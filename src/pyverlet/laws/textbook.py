@@ -9,13 +9,13 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from pyverlet.ground.arrays import Array
-from pyverlet.ground.errors import InputError
-from pyverlet.laws.rooms import Boundary, Box, Circle, Extent, held_by
-from pyverlet.state.slots import Slots
+from pyverlet.common.arrays import Array
+from pyverlet.common.errors import InputError
+from pyverlet.laws.boundaries import Boundary, Box, Circle, Extent, held_by
+from pyverlet.state.sorted_state import SortedState
 
 
-class Naive(Boundary):
+class TextbookBoundary(Boundary):
     """Base class of the textbook boundaries: a room with the shape of another one.
 
     Args:
@@ -36,7 +36,7 @@ class Naive(Boundary):
         """e of the walls."""
         return self.room.restitution
 
-    def confine(self, state: Slots, h: float, lag: float, rest_speed: float) -> None:
+    def confine(self, state: SortedState, h: float, lag: float, rest_speed: float) -> None:
         room, x, r = self.room, state.position, state.radius
         held, real = held_by(room, state) > 0, state.real
         if isinstance(room, Circle):
@@ -51,7 +51,7 @@ class Naive(Boundary):
             out = np.flatnonzero(held & (depth > 0))
             self._put_back(state, out, np.broadcast_to(normal, (len(out), 2)), depth[out], h)
 
-    def _put_back(self, state: Slots, which: Array, normal: Array, depth: Array, h: float) -> None:
+    def _put_back(self, state: SortedState, which: Array, normal: Array, depth: Array, h: float) -> None:
         """Put back circles that are `depth` (k,) m beyond a wall of `normal` (k, 2) into the room."""
         state.position[which] += depth[:, None] * normal
         towards = (state.velocity[which] * normal).sum(axis=1)
@@ -74,7 +74,7 @@ class Naive(Boundary):
         return f"{type(self).__name__}({self.room!r})"
 
 
-class ClampAndFlip(Naive):
+class ClampAndFlip(TextbookBoundary):
     """Put the circle back on the wall and reverse the normal velocity, times e. For demonstration.
 
     Under gravity g even e = 1 does not conserve energy. A method whose velocity belongs to the time of the position gains m g d
@@ -88,7 +88,7 @@ class ClampAndFlip(Naive):
     _flip = True
 
 
-class ProjectOnly(Naive):
+class ProjectOnly(TextbookBoundary):
     """Put the circle back on the wall and nothing else, as if x - x_prev were its whole state. For demonstration.
 
     The shift d enters the velocity as d / h. An arriving circle ends at rest on the wall, whatever its speed: its restitution is

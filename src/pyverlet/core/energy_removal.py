@@ -32,10 +32,10 @@ from pyverlet.core.energy_limiting import (
     free_mass,
     map_bodies,
     read_limits,
+    remove_within,
     share_out,
     speed_left,
     sum_clusters,
-    take_within,
 )
 from pyverlet.core.kernels import kernel
 
@@ -58,7 +58,7 @@ def find_drift(g: cython.pointer(Limits), of: cython.pointer(cython.double), clu
 
 
 @kernel
-def take_as_a_whole(
+def remove_as_a_whole(
     now: cython.pointer(Bodies),
     g: cython.pointer(Limits),
     cluster: cython.pointer[cython.const[int64_t]],
@@ -90,7 +90,7 @@ def take_as_a_whole(
         of[c + ACROSS] = speed_left(rest, of[c + ALONG])
 
 
-def take_energy(then, now, about, limits, lift, moved, lower):
+def remove_energy(then, now, about, limits, lift, moved, lower):
     """Remove surplus energy from velocities and spins, and write by how much to lower particles, `lower` (n, 2) m. Returns (n,)
     bool: whether their motion had less than the surplus.
 
@@ -130,9 +130,9 @@ def take_energy(then, now, about, limits, lift, moved, lower):
         cython.address(a), cython.address(b), cython.address(g), root, order, share, shared, cluster, count, work, place, of
     )
     share_out(cython.address(g), of, clusters)
-    take_within(cython.address(b), cluster, count, place, velocity, of, clusters)
+    remove_within(cython.address(b), cluster, count, place, velocity, of, clusters)
     find_drift(cython.address(g), of, clusters)
-    take_as_a_whole(cython.address(b), cython.address(g), cluster, count, velocity, work, of, clusters)
+    remove_as_a_whole(cython.address(b), cython.address(g), cluster, count, velocity, work, of, clusters)
     one: cython.double = 1.0
     for k in range(count):
         c: int64_t = COLUMNS_OF_CLUSTER * cluster[k]

@@ -11,8 +11,8 @@ from contextlib import AbstractContextManager, contextmanager, nullcontext
 from threading import get_ident
 from typing import Any, Concatenate, ParamSpec, TypeVar
 
-from pyverlet.ground.errors import InputError
-from pyverlet.ground.interrupts import whole
+from pyverlet.common.errors import InputError
+from pyverlet.common.interrupts import without_interrupts
 
 P = ParamSpec("P")
 R = TypeVar("R")
@@ -40,7 +40,7 @@ class StepLock:
             _all.add(self)
 
     def _renew(self) -> None:
-        self._door, self._room = threading.Lock(), threading.RLock()
+        self._queue, self._lock = threading.Lock(), threading.RLock()
 
     @property
     def mine(self) -> bool:
@@ -57,9 +57,9 @@ class StepLock:
         me, stepped = get_ident(), False
         if self.holder != me:
             stepped = self.in_frame
-            if self._door.locked() or not self._room.acquire(blocking=False):
-                with self._door:  # held while waiting, so that the holder cannot take it again before
-                    self._room.acquire()
+            if self._queue.locked() or not self._lock.acquire(blocking=False):
+                with self._queue:  # held while waiting, so that the holder cannot take it again before
+                    self._lock.acquire()
             self.holder = me
         self._depth += 1
         return stepped
@@ -68,7 +68,7 @@ class StepLock:
         self._depth -= 1
         if not self._depth:
             self.holder = None
-            self._room.release()
+            self._lock.release()
 
     def frame(self) -> _Frame:
         """The context of a frame of its holder; user functions called in it must not change the world."""
@@ -84,16 +84,16 @@ class StepLock:
 class _Frame:
     """The context of a frame."""
 
-    __slots__ = ("_turn",)
+    __slots__ = ("_lock",)
 
-    def __init__(self, turn: StepLock) -> None:
-        self._turn = turn
+    def __init__(self, lock: StepLock) -> None:
+        self._lock = lock
 
     def __enter__(self) -> None:
-        self._turn.in_frame = True
+        self._lock.in_frame = True
 
     def __exit__(self, *_: object) -> None:
-        self._turn.in_frame = False
+        self._lock.in_frame = False
 
 
 class Shared:
@@ -102,7 +102,7 @@ class Shared:
     _state: Any
 
 
-def in_turn(method: Callable[Concatenate[S, P], R]) -> Callable[Concatenate[S, P], R]:
+def exclusive(method: Callable[Concatenate[S, P], R]) -> Callable[Concatenate[S, P], R]:
     """Decorator of methods that change a world: they wait for the lock and for the page; Ctrl-C is delayed to their end.
 
     Raises:
@@ -111,24 +111,24 @@ def in_turn(method: Callable[Concatenate[S, P], R]) -> Callable[Concatenate[S, P
 
     @functools.wraps(method)
     def waiting(self: S, /, *arguments: P.args, **options: P.kwargs) -> R:
-        turn: StepLock = self._state.turn
-        if turn.in_frame and turn.mine:
+        lock: StepLock = self._state.lock
+        if lock.in_frame and lock.mine:
             raise InputError(
                 f"{method.__name__.strip('_')} is called in the middle of a frame of this world; "
                 "allowed is between two frames, as actors do"
             )
-        with whole, turn if turn.page is None else turn.held():
+        with without_interrupts, lock if lock.page is None else lock.held():
             return method(self, *arguments, **options)
 
     return waiting
 
 
-def of_one_frame(method: Callable[Concatenate[S, P], R]) -> Callable[Concatenate[S, P], R]:
+def between_frames(method: Callable[Concatenate[S, P], R]) -> Callable[Concatenate[S, P], R]:
     """Decorator of methods that read a world: they wait for the end of a frame in another thread."""
 
     @functools.wraps(method)
     def reading(self: S, /, *arguments: P.args, **options: P.kwargs) -> R:
-        with self._state.turn:
+        with self._state.lock:
             return method(self, *arguments, **options)
 
     return reading
@@ -144,25 +144,25 @@ _taken: list[StepLock] = []
 def _before_fork() -> None:
     """Before a fork: wait until all worlds are between frames and locks are free, as the child has only the forking thread."""
     _all_lock.acquire()
-    for turn in _all:
-        if turn.mine:
+    for lock in _all:
+        if lock.mine:
             continue
-        if turn._door.acquire(timeout=_FORK_S):
-            if turn._room.acquire(timeout=_FORK_S):
-                _taken.append(turn)
-            turn._door.release()
+        if lock._queue.acquire(timeout=_FORK_S):
+            if lock._lock.acquire(timeout=_FORK_S):
+                _taken.append(lock)
+            lock._queue.release()
 
 
 def _after_fork(*, child: bool) -> None:
     while _taken:
-        _taken.pop()._room.release()
+        _taken.pop()._lock.release()
     if child:
-        for turn in _all:
-            if not turn.mine:
-                turn.holder, turn._depth, turn.in_frame = None, 0, False
-                turn._renew()
-            turn._door = threading.Lock()
-            turn.page = None
+        for lock in _all:
+            if not lock.mine:
+                lock.holder, lock._depth, lock.in_frame = None, 0, False
+                lock._renew()
+            lock._queue = threading.Lock()
+            lock.page = None
     _all_lock.release()
 
 

@@ -8,14 +8,14 @@ import numpy as np
 from cython.cimports.arrays import doubles, integers, integers_in, reals_in, small_integers_in
 
 from pyverlet.core.engine_surfaces import make_sensing_arrays
-from pyverlet.core.hearing import room_to_hear, take_heard
+from pyverlet.core.event_recording import collect_events, count_events
 from pyverlet.core.step import Step
 
 
 @cython.cfunc
-def make_hearing_arrays(w: cython.pointer(Step), a, dtype, fresh: cython.bint = False):
+def make_event_arrays(w: cython.pointer(Step), a, dtype, fresh: cython.bint = False):
     """Allocate event records, one per lane, if events are recorded. fresh: clear them."""
-    lanes = w.lists.lanes_room if w.listening else 0
+    lanes = w.lists.lanes_capacity if w.records_events else 0
     if fresh or "met" not in a or len(a["met"]) < lanes:
         a |= {name: np.zeros(lanes, dtype) for name in ("met", "pressed")}
         a |= {name: np.zeros(lanes, np.int32) for name in ("touched", "bounces")}
@@ -24,20 +24,20 @@ def make_hearing_arrays(w: cython.pointer(Step), a, dtype, fresh: cython.bint = 
 
 
 @cython.cfunc
-def listen(w: cython.pointer(Step), a, number, dtype):
-    """See `Engine.listen`."""
-    broken: cython.bint = w.listening  # the last frame was not completed
-    w.listening, w.collected, w.waiting = number is not None, True, False
-    if w.listening:
+def record_events(w: cython.pointer(Step), a, number, dtype):
+    """See `Engine.record_events`."""
+    broken: cython.bint = w.records_events  # the last frame was not completed
+    w.records_events, w.collected, w.waiting = number is not None, True, False
+    if w.records_events:
         a["number"] = number
-        make_hearing_arrays(w, a, dtype, broken)
+        make_event_arrays(w, a, dtype, broken)
         make_sensing_arrays(w, a)
 
 
 @cython.cfunc
-def hear(w: cython.pointer(Step), a):
-    """(keys, speeds, bounces, impulses) of touching contacts, see `take_heard`; the records are then cleared."""
-    room: cython.Py_ssize_t = room_to_hear(w)
-    (keys, bounces), (speeds, pushes) = np.empty((2, room), np.int64), np.empty((2, room))
-    found = take_heard(w, integers_in(a, "number"), integers(keys), doubles(speeds), integers(bounces), doubles(pushes))
+def events_of(w: cython.pointer(Step), a):
+    """(keys, speeds, bounces, impulses) of touching contacts, see `collect_events`; the records are then cleared."""
+    capacity: cython.Py_ssize_t = count_events(w)
+    (keys, bounces), (speeds, pushes) = np.empty((2, capacity), np.int64), np.empty((2, capacity))
+    found = collect_events(w, integers_in(a, "number"), integers(keys), doubles(speeds), integers(bounces), doubles(pushes))
     return keys[:found], speeds[:found], bounces[:found], pushes[:found]

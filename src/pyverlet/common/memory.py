@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import DTypeLike
 
-from pyverlet.ground.arrays import Array
+from pyverlet.common.arrays import Array
 
 _HUGE = 1 << 21  # bytes of a huge page
 _FEW = 32  # number of removed rows up to which gaps are closed one by one
@@ -73,13 +73,13 @@ def resized(known: Array, count: int) -> Array:
 
     known: a previous result, or an array that is not part of another one.
     """
-    room = known.base
-    if not isinstance(room, np.ndarray) or (room.dtype, room.shape[1:]) != (known.dtype, known.shape[1:]):
-        room = known
-    if len(room) < count:
-        room = empty((count + (count // _SPARE if len(known) else 0), *known.shape[1:]), known.dtype)
-        room[: len(known)] = known
-    return room[:count]
+    base = known.base
+    if not isinstance(base, np.ndarray) or (base.dtype, base.shape[1:]) != (known.dtype, known.shape[1:]):
+        base = known
+    if len(base) < count:
+        base = empty((count + (count // _SPARE if len(known) else 0), *known.shape[1:]), known.dtype)
+        base[: len(known)] = known
+    return base[:count]
 
 
 def extended(known: Array, fresh: Array) -> Array:
