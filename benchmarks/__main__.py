@@ -67,7 +67,7 @@ def measure(engines: list[type[Engine]], heap: Heap, frames: int) -> list[Row]:
             world.step()
     settled = [world.position().copy() for world in worlds]  # all after the same time, whoever makes more frames when timed
     times = own.in_turn([world.step for world in worlds], max(frames // own.ROUNDS, 1))
-    ours = min(ms for world, ms in zip(worlds, times, strict=True) if world.name.startswith("pyverlet"))
+    ours = min(ms for world, ms in zip(worlds, times, strict=True) if world.settings.startswith("8 substeps"))
     rows = []
     for world, ms, now in zip(worlds, times, settled, strict=True):
         found, outside = overlap(now), int((np.hypot(*now.astype(float).T) > heap.cage).sum())
@@ -190,7 +190,8 @@ def plot(rows: list[Row], path: Path) -> None:
     from matplotlib import pyplot as plt
 
     figure, axes = plt.subplots(figsize=(7, 4.5), layout="constrained")
-    styles = zip(("o-", "s-", "^--", "D--", "v:"), ("#0072B2", "#56B4E9", "#D55E00", "#009E73", "#999999"), strict=True)
+    colours = ("#0072B2", "#56B4E9", "#CC79A7", "#D55E00", "#009E73", "#999999")
+    styles = zip(("o-", "s-", "p-", "^--", "D--", "v:"), colours, strict=True)
     for (mark, colour), name in zip(styles, dict.fromkeys(row.engine for row in rows), strict=False):
         mine = [row for row in rows if row.engine == name]
         axes.loglog([row.particles for row in mine], [row.ms_per_frame for row in mine], mark, color=colour, label=name)

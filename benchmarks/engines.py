@@ -91,13 +91,14 @@ class Engine(ABC):
 
 class _Pyverlet(Engine):
     threads: ClassVar[int] = 1
+    substeps: ClassVar[int] = 8
     method: ClassVar[pv.Fast | pv.BruteForce] = pv.Fast()
 
     def __init__(self, heap: Heap) -> None:
         law = pv.Collisions(restitution=heap.restitution, friction=heap.friction, method=self.method)
         lower, upper, e = (-heap.cage, -heap.cage), (heap.cage, heap.cage), heap.restitution
         room = pv.Box(lower, upper, restitution=e) if heap.box else pv.Circle(radius=heap.cage, restitution=e)
-        self._world = pv.World(gravity=heap.gravity, boundary=room, collisions=law, substeps=8, threads=self.threads)
+        self._world = pv.World(gravity=heap.gravity, boundary=room, collisions=law, substeps=self.substeps, threads=self.threads)
         self._world.add(position=heap.position, velocity=heap.velocity, radius=heap.radius, mass=heap.mass)
 
     def step(self, dt: float = DT) -> None:
@@ -123,6 +124,14 @@ class PyverletTwoThreads(_Pyverlet):
     name = "pyverlet, 2 threads"
     settings = "8 substeps, float32"
     threads = 2
+
+
+class PyverletFewSubsteps(PyverletTwoThreads):
+    """Ours, with as many substeps as Box2D takes by default."""
+
+    name = "pyverlet, 4 substeps"
+    settings = "2 threads, 4 substeps, float32"
+    substeps = 4
 
 
 class PyverletBruteForce(_Pyverlet):
@@ -232,7 +241,9 @@ class Box2DCareful(Box2D):
     threshold = 0.0
 
 
-ENGINES: tuple[type[Engine], ...] = (PyverletOneThread, PyverletTwoThreads, Pymunk, Box2D, PyverletBruteForce)
+ENGINES: tuple[type[Engine], ...] = (
+    PyverletOneThread, PyverletTwoThreads, PyverletFewSubsteps, Pymunk, Box2D, PyverletBruteForce,
+)  # fmt: skip
 """Compared for speed."""
 
 CAREFUL: tuple[type[Engine], ...] = (PyverletOneThread, Pymunk, PymunkCareful, Box2D, Box2DCareful)
