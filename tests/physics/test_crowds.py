@@ -1,4 +1,4 @@
-"""Circles that begin in each other: they part within two seconds, at moderate speed, no farther than they must."""
+"""Circles that begin in each other: they part within two or three seconds, at moderate speed, no farther than they must."""
 
 from typing import Any
 
@@ -15,7 +15,7 @@ FASTEST = 20.0  # m/s: overlaps are pushed out with 8 radii/s each, which adds u
 
 
 def part(world: pv.World, seconds: float = SECONDS) -> None:
-    """Two seconds of a crowd, and what is promised of it."""
+    """So many seconds of a crowd, and what is promised of it."""
     fastest = 0.0
     for _ in each_frame(world, round(seconds * 60)):
         fastest = max(fastest, float(np.hypot(*np.asarray(world.velocity).T).max()))

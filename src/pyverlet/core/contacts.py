@@ -275,7 +275,7 @@ def solve(
         roll: lanes = zero
         if rough:
             old: lanes = load(w.tangent_impulse, k)
-            arm: lanes = arm_of(w, k, load(w.depth, k))
+            arm: lanes = arm_of(w, k, depth if soft else load(w.depth, k))
             new: lanes = clamped(
                 old - load(w.grip, k * w.mixed) * slip_of(w, k, m, nx, ny, arm), load(w.friction, k * w.mixed) * after
             )

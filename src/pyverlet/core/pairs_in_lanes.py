@@ -106,8 +106,8 @@ def apply_impulses(
 def slip_of(w: cython.pointer(Step), k: cython.Py_ssize_t, m: Motion, nx: lanes, ny: lanes, arm: lanes) -> lanes:
     """Slip velocity of the contact points of the pairs from k on along the tangent, m/s."""
     at: cython.Py_ssize_t = k * w.mixed
-    turns: lanes = arm * (m.us * load(w.radius_i, at) + m.vs * load(w.radius_j, at))
-    return (m.vx - m.ux) * ny - (m.vy - m.uy) * nx + turns
+    rims: lanes = arm * (m.us * load(w.radius_i, at) + m.vs * load(w.radius_j, at))
+    return (m.vx - m.ux) * ny - (m.vy - m.uy) * nx + rims
 
 
 @inlined
