@@ -26,8 +26,8 @@ PUSHES = cython.declare(cython.int, 1)  # normal part, which separates them
 GIVE_Y = cython.declare(cython.int, 2)
 TANGENT = cython.declare(cython.int, 3)  # tangential part, along (n_y, -n_x)
 ABOUT = cython.declare(cython.int, 4)  # surface number, later its distance, m; of a pair the normal impulse times distance, N s m
-NORMAL_X = cython.declare(cython.int, 5)  # out of the first circle
-NORMAL_Y = cython.declare(cython.int, 6)
+OUT_X = cython.declare(cython.int, 5)  # out of the first circle
+OUT_Y = cython.declare(cython.int, 6)
 
 PAIR = cython.declare(int64_t, 0x100000000)
 """Key of a pair: the lower circle times twice this, plus this, plus the other one. Other keys have a surface number in the low

@@ -7,7 +7,7 @@ import cython
 from cython.cimports.libc.math import INFINITY, sqrt
 from cython.cimports.libc.stdint import int32_t, int64_t
 
-from pyverlet.core.contact_recording import ABOUT, GIVE_X, GIVE_Y, NORMAL_X, NORMAL_Y, PAIR, PUSHES, ROW, TANGENT, WALL
+from pyverlet.core.contact_recording import ABOUT, GIVE_X, GIVE_Y, OUT_X, OUT_Y, PAIR, PUSHES, ROW, TANGENT, WALL
 from pyverlet.core.kernels import kernel
 from pyverlet.core.obstacles import BODY_OF, LATE, LENGTH, ROUNDING, SEGMENT
 from pyverlet.core.periodic import nearest_in_double, wrapped_in_double
@@ -84,8 +84,8 @@ def locate_records(
             see_segment(w, place[whose], surface - SIDES, row, at + ABOUT)
             key[n] = (whose << 33) + cython.cast(int64_t, w.segment[SEGMENT * (surface - SIDES) + BODY_OF]) % bodies
         if row[at + GIVE_X] != row[at + GIVE_X]:
-            row[at + GIVE_X] = row[at + TANGENT] * row[at + NORMAL_Y] - row[at + PUSHES] * row[at + NORMAL_X]
-            row[at + GIVE_Y] = -row[at + TANGENT] * row[at + NORMAL_X] - row[at + PUSHES] * row[at + NORMAL_Y]
+            row[at + GIVE_X] = row[at + TANGENT] * row[at + OUT_Y] - row[at + PUSHES] * row[at + OUT_X]
+            row[at + GIVE_Y] = -row[at + TANGENT] * row[at + OUT_X] - row[at + PUSHES] * row[at + OUT_Y]
 
 
 @kernel
@@ -94,12 +94,12 @@ def add_row(row: cython.p_double, to: cython.Py_ssize_t, more: cython.Py_ssize_t
     k: cython.Py_ssize_t
     for k in range(5 if pair else 4):
         row[to + k] += row[more + k]
-    if pair or (row[more + NORMAL_X] == row[to + NORMAL_X] and row[more + NORMAL_Y] == row[to + NORMAL_Y]):
+    if pair or (row[more + OUT_X] == row[to + OUT_X] and row[more + OUT_Y] == row[to + OUT_Y]):
         return
     if row[more + ABOUT] < row[to + ABOUT]:
-        row[to + ABOUT], row[to + NORMAL_X], row[to + NORMAL_Y] = row[more + ABOUT], row[more + NORMAL_X], row[more + NORMAL_Y]
-    row[to + PUSHES] = -row[to + GIVE_X] * row[to + NORMAL_X] - row[to + GIVE_Y] * row[to + NORMAL_Y]
-    row[to + TANGENT] = row[to + GIVE_X] * row[to + NORMAL_Y] - row[to + GIVE_Y] * row[to + NORMAL_X]
+        row[to + ABOUT], row[to + OUT_X], row[to + OUT_Y] = row[more + ABOUT], row[more + OUT_X], row[more + OUT_Y]
+    row[to + PUSHES] = -row[to + GIVE_X] * row[to + OUT_X] - row[to + GIVE_Y] * row[to + OUT_Y]
+    row[to + TANGENT] = row[to + GIVE_X] * row[to + OUT_Y] - row[to + GIVE_Y] * row[to + OUT_X]
 
 
 @kernel
@@ -157,7 +157,7 @@ def see_pair(
     else:
         row[at + PUSHES] = row[at + GIVE_X] * x + row[at + GIVE_Y] * y
         row[at + TANGENT] = row[at + GIVE_X] * y - row[at + GIVE_Y] * x
-    row[at + NORMAL_X], row[at + NORMAL_Y] = x, y
+    row[at + OUT_X], row[at + OUT_Y] = x, y
     radius: cython.double = w.radius[i]
     return radius + 0.5 * (far - radius - w.radius[j])
 
@@ -188,9 +188,9 @@ def write_records(
         to: cython.Py_ssize_t = RECORD_COLUMNS * m
         whole[to], whole[to + 1] = a, b if pair else -1
         whole[to + 2], whole[to + 3] = b - WALL if wall else -1, -1 if pair or wall else b
-        value[to + 4] = wrapped_in_double(w.position[2 * i] + far * row[at + NORMAL_X], w.cells.low_x, w.cells.period_x)
-        value[to + 5] = wrapped_in_double(w.position[2 * i + 1] + far * row[at + NORMAL_Y], w.cells.low_y, w.cells.period_y)
-        value[to + 6], value[to + 7] = row[at + NORMAL_X], row[at + NORMAL_Y]
+        value[to + 4] = wrapped_in_double(w.position[2 * i] + far * row[at + OUT_X], w.cells.low_x, w.cells.period_x)
+        value[to + 5] = wrapped_in_double(w.position[2 * i + 1] + far * row[at + OUT_Y], w.cells.low_y, w.cells.period_y)
+        value[to + 6], value[to + 7] = row[at + OUT_X], row[at + OUT_Y]
         value[to + 8], value[to + 9] = row[at + PUSHES], row[at + TANGENT] if pair else 0 - row[at + TANGENT]
         whole[to + 10], whole[to + 11] = number[a], number[b] if pair else -1
         m += 1

@@ -118,24 +118,21 @@ def renumber_list(a: Arrays, order: Array, groups: int) -> None:
 def remembered_at_surfaces(a: Arrays, side: int, push: int, roll: int, held: int) -> tuple[Array, Array, Array]:
     """(sorted_index, surface, values) of loaded contacts, and those with one-way lines; the load is -1 where these let pass."""
     sorted_index, place = places_of(a)
-    values, holds, surface = (
-        a[f"contact{side}"][place, push : roll + 1],
-        a[f"contact{side}"][place, held],
-        a[f"surface{side}"][place],
-    )
+    rows, surface = a[f"contact{side}"], a[f"surface{side}"][place]
+    values, holds = rows[place // 8, push // 8 : roll // 8 + 1, place % 8], rows[place // 8, held // 8, place % 8]
     values[holds < 0, 0] = -1
     loaded = ((values[:, 0] > 0) | (holds != 0)) & (surface >= 0)  # contacts with pinned circles are stored as pairs
     return sorted_index[loaded].astype(np.int32), surface[loaded], values[loaded]
 
 
-def remember_at_surfaces(a: Arrays, side: int, rows: tuple[Array, Array, Array], push: int, roll: int, held: int) -> None:
+def remember_at_surfaces(a: Arrays, side: int, known: tuple[Array, Array, Array], push: int, roll: int, held: int) -> None:
     """Write (sorted_index, surface, values), sorted by row, to one of the two surface lists."""
-    sorted_index, surface, values = rows
-    contact = a[f"contact{side}"][: len(sorted_index)]
+    sorted_index, surface, values = known
+    rows, place = a[f"contact{side}"], np.arange(len(sorted_index))
     a[f"surface{side}"][: len(sorted_index)] = surface
-    contact[:, push : roll + 1] = values
-    contact[:, held] = np.where(values[:, 0] < 0, -1, 1)
-    contact[:, push] = np.maximum(values[:, 0], 0)
+    rows[place // 8, push // 8 : roll // 8 + 1, place % 8] = values
+    rows[place // 8, held // 8, place % 8] = np.where(values[:, 0] < 0, -1, 1)
+    rows[place // 8, push // 8, place % 8] = np.maximum(values[:, 0], 0)
     particles = np.arange(len(a["contact_begin"]))
     a["contact_begin"][:] = np.searchsorted(sorted_index, particles, "left")
     a["contact_end"][:] = np.searchsorted(sorted_index, particles, "right")

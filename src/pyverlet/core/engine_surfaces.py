@@ -24,14 +24,15 @@ MOST_LOOKED_FOR = cython.declare(cython.int, 8)
 def make_surface_arrays(w: cython.pointer(Step), a, capacity: cython.Py_ssize_t):
     """Allocate two surface lists with so many places each; the state of the previous one is kept."""
     old = w.side != 0
+    eights = (capacity + 15) // 8
     for side in range(2):
-        surface, contact = np.zeros(capacity + 8, np.int32), np.zeros((capacity + 8, CONTACT))
+        surface, contact = np.zeros(8 * eights, np.int32), np.zeros((eights, CONTACT, 8))
         if (side == 0) == old and w.contact_capacity > 0:
-            before = len(a[f"surface{side}"])
-            surface[:before], contact[:before] = a[f"surface{side}"], a[f"contact{side}"]
+            before = a[f"contact{side}"]
+            surface[: 8 * len(before)], contact[: len(before)] = a[f"surface{side}"], before
         a[f"surface{side}"], a[f"contact{side}"] = surface, contact
-    a["clear"], w.contact_capacity = np.zeros((capacity + 8, 3)), capacity
-    w.clear = doubles_in(a, "clear")
+    a["clear"], a["contact_particle"] = np.zeros((eights, 3, 8)), np.zeros(8 * eights, np.uint32)
+    w.clear, w.contact_particle, w.contact_capacity = doubles_in(a, "clear"), indices_in(a, "contact_particle"), capacity
     make_rebound_arrays(w, a)
     point_to_surfaces(w, a)
 

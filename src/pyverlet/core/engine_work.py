@@ -7,7 +7,7 @@ import cython
 
 from pyverlet.core.link_motors import work_of_last_motors
 from pyverlet.core.step import Step
-from pyverlet.core.surface_rows import CONTACT, DRAG, NORMAL, PUSH, ROLL, SPEED, SPIN
+from pyverlet.core.surface_rows import DRAG, NORMAL, NORMAL_Y, PUSH, ROLL, SPEED, SPEED_Y, SPIN, row_of
 from pyverlet.core.work import BY_FRICTION, BY_IMPACTS, BY_MOTORS, BY_PLACES, BY_ROLLING, BY_WALLS, WORK, moment
 
 
@@ -75,12 +75,12 @@ def friction_of_last(w: cython.pointer(Step), share: cython.double) -> tuple:
     if w.surfaces_good:
         for i in range(w.count):
             for k in range(w.contact_begin[i], w.contact_end[i]):
-                first: cython.Py_ssize_t = CONTACT * k
+                first: cython.Py_ssize_t = row_of(k)
                 if row[first + PUSH] > 0 and w.inverse_mass[i] > 0:
                     x = w.velocity[2 * i] - half * w.given[2 * i] - row[first + SPEED]
-                    y = w.velocity[2 * i + 1] - half * w.given[2 * i + 1] - row[first + SPEED + 1]
+                    y = w.velocity[2 * i + 1] - half * w.given[2 * i + 1] - row[first + SPEED_Y]
                     spin = w.spin[i] - half * w.given_spin[i]
-                    slip: cython.double = x * row[first + NORMAL + 1] - y * row[first + NORMAL] - w.radius[i] * spin
+                    slip: cython.double = x * row[first + NORMAL_Y] - y * row[first + NORMAL] - w.radius[i] * spin
                     by_friction += row[first + DRAG] * slip / w.inverse_mass[i]
                     rolled += row[first + ROLL] * (spin - row[first + SPIN]) / w.inverse_mass[i]
     return share * by_friction, share * rolled, work_of_last_motors(w, share)

@@ -11,17 +11,19 @@ from pyverlet.core.kernels import inlined, kernel
 from pyverlet.core.pair_memory import repeats
 from pyverlet.core.step import Step
 from pyverlet.core.surface_rows import (
-    CONTACT,
     EVENT,
     EVENT_BOUNCES,
     EVENT_IMPULSE,
     EVENT_SPEED,
     GAP,
     NORMAL,
+    NORMAL_Y,
     PUSH,
     ROUNDED,
     SPEED,
+    SPEED_Y,
     pinned_lane,
+    row_of,
 )
 
 SURFACE_BIT = cython.declare(int64_t, 0x80000000)
@@ -69,11 +71,11 @@ def record_surface(
     """Record that contact k of particle i with a surface met at `speed` and separates at `away`."""
     if w.records_events:
         row: cython.pointer(cython.double) = w.contact
-        row[CONTACT * k + EVENT] = 1
-        row[CONTACT * k + EVENT_SPEED] = max(row[CONTACT * k + EVENT_SPEED], speed)
-        row[CONTACT * k + EVENT_IMPULSE] += speed + away
+        row[row_of(k) + EVENT] = 1
+        row[row_of(k) + EVENT_SPEED] = max(row[row_of(k) + EVENT_SPEED], speed)
+        row[row_of(k) + EVENT_IMPULSE] += speed + away
         if away > least_bounce(w, i):
-            row[CONTACT * k + EVENT_BOUNCES] += 1
+            row[row_of(k) + EVENT_BOUNCES] += 1
 
 
 @inlined
@@ -101,7 +103,7 @@ def record_more(w: cython.pointer(Step), k: cython.Py_ssize_t, given: cython.dou
     if w.records_events and w.surface[k] < 0:
         w.pressed[pinned_lane(w, k)] += cython.cast(real, given)
     elif w.records_events:
-        w.contact[CONTACT * k + EVENT_IMPULSE] += given
+        w.contact[row_of(k) + EVENT_IMPULSE] += given
 
 
 @kernel
@@ -110,9 +112,9 @@ def record_held(w: cython.pointer(Step), i: cython.Py_ssize_t, vx: cython.double
     k: cython.Py_ssize_t
     row: cython.pointer(cython.double) = w.contact
     for k in range(w.contact_begin[i], w.contact_end[i]):
-        at: cython.Py_ssize_t = CONTACT * k
+        at: cython.Py_ssize_t = row_of(k)
         if row[at + PUSH] > 0:
-            speed: cython.double = (vx - row[at + SPEED]) * row[at + NORMAL] + (vy - row[at + SPEED + 1]) * row[at + NORMAL + 1]
+            speed: cython.double = (vx - row[at + SPEED]) * row[at + NORMAL] + (vy - row[at + SPEED_Y]) * row[at + NORMAL_Y]
             if w.surface[k] >= 0:
                 if row[at + EVENT] == 0 and row[at + EVENT_SPEED] == 0:
                     row[at + EVENT_SPEED] = max(speed, 0.0)
@@ -142,12 +144,12 @@ def record_surface_loads(w: cython.pointer(Step), i: cython.Py_ssize_t) -> cytho
     """Record surfaces that carry particle i, or touch it up to rounding; clear the speed of others."""
     k: cython.Py_ssize_t
     for k in range(w.contact_begin[i], w.contact_end[i]):
-        given: cython.double = w.contact[CONTACT * k + PUSH]
-        if w.surface[k] >= 0 and (given > 0 or w.contact[CONTACT * k + GAP] <= ROUNDED * w.radius[i]):
-            w.contact[CONTACT * k + EVENT] = 1
-            w.contact[CONTACT * k + EVENT_IMPULSE] += w.rest_scale * given
-        elif w.contact[CONTACT * k + EVENT] == 0:
-            w.contact[CONTACT * k + EVENT_SPEED] = 0
+        given: cython.double = w.contact[row_of(k) + PUSH]
+        if w.surface[k] >= 0 and (given > 0 or w.contact[row_of(k) + GAP] <= ROUNDED * w.radius[i]):
+            w.contact[row_of(k) + EVENT] = 1
+            w.contact[row_of(k) + EVENT_IMPULSE] += w.rest_scale * given
+        elif w.contact[row_of(k) + EVENT] == 0:
+            w.contact[row_of(k) + EVENT_SPEED] = 0
 
 
 @kernel
@@ -185,7 +187,7 @@ def collect_events(
     for i in range(w.count if w.surfaces_good else 0):
         for k in range(w.contact_begin[i], w.contact_end[i]):
             row: cython.pointer(cython.double) = w.contact
-            at: cython.Py_ssize_t = CONTACT * k
+            at: cython.Py_ssize_t = row_of(k)
             if row[at + EVENT] > 0:
                 key[n] = (number[w.lists.particle[i]] << 32) + SURFACE_BIT + w.surface[k]
                 speed[n], bounces[n] = row[at + EVENT_SPEED], cython.cast(int64_t, row[at + EVENT_BOUNCES])

@@ -26,7 +26,7 @@ from cython.cimports.team import team_enter, team_stage
 from pyverlet.core.cells import BLOCK
 from pyverlet.core.contact_recording import pair_records_stage
 from pyverlet.core.contacts import bounce_again, hold_contacts, solve_contacts
-from pyverlet.core.event_recording import record_held, record_loads, record_surface_loads
+from pyverlet.core.event_recording import record_loads, record_surface_loads
 from pyverlet.core.kernels import inlined, kernel
 from pyverlet.core.link_motors import add_motor_work, keep_motor_spin
 from pyverlet.core.links import begin_links, end_links, limit_warm_links, remember_motors_stage, solve_links
@@ -38,9 +38,9 @@ from pyverlet.core.sensors import sense
 from pyverlet.core.shared_impacts import begin_impacts, share_impacts
 from pyverlet.core.spans import INTEGRATE, LINKS, NOTES, PAIRS, SURFACES
 from pyverlet.core.step import NEAR, OPEN, Step
-from pyverlet.core.surface_contacts import forget_jam, hold_surfaces, relax_surfaces, warm_surfaces
+from pyverlet.core.surface_batches import TASK_HOLD, TASK_RELAX, solve_surfaces
+from pyverlet.core.surface_contacts import forget_jam, warm_surfaces
 from pyverlet.core.surface_sides import keep_in_sight, keep_inside, keep_sides
-from pyverlet.core.surfaces import bounce_surfaces, has_rebounds, keeps_clear
 from pyverlet.core.warm_start import warm_start
 from pyverlet.core.work import add_drift_work, add_end_work, add_friction_work, add_grip_work, add_start_work
 
@@ -72,25 +72,6 @@ def warm_surfaces_stage(what: cython.p_void, item: cython.int) -> cython.void:
 
 
 @kernel
-def hold_block(w: cython.pointer(Step), block: cython.Py_ssize_t) -> cython.void:
-    """Particles of a block that hit surfaces fast bounce; others are held."""
-    width: cython.Py_ssize_t = 4 if w.rough else 2
-    v: cython.pointer(real) = w.motion if w.rough else w.velocity
-    for n in range(block * BLOCK, block * BLOCK + w.at_surface_count[block]):
-        i: cython.Py_ssize_t = w.at_surface[n]
-        clear: cython.bint = keeps_clear(w, i)
-        if not (clear and w.thrown[i] == 0) and bounce_surfaces(w, i):
-            clear = keeps_clear(w, i)
-            if w.linked:
-                w.rebounds[block] |= has_rebounds(w, i)
-        x: real = v[width * i]
-        y: real = v[width * i + 1]
-        hold_surfaces(w, i, clear)
-        if w.records_events:
-            record_held(w, i, x, y)
-
-
-@kernel
 def hold_surfaces_stage(what: cython.p_void, item: cython.int) -> cython.void:
     """Hold particles of a block at surfaces after the warm start of contacts."""
     w: cython.pointer(Step) = cython.cast(cython.pointer(Step), what)
@@ -98,14 +79,14 @@ def hold_surfaces_stage(what: cython.p_void, item: cython.int) -> cython.void:
     block: cython.int = w.awake[item]
     for n in range(block * BLOCK, block * BLOCK + w.at_surface_count[block]):
         forget_jam(w, w.at_surface[n])
-    hold_block(w, block)
+    solve_surfaces(w, block, TASK_HOLD)
 
 
 @kernel
 def hold_on_stage(what: cython.p_void, item: cython.int) -> cython.void:
     """Hold particles of a block at surfaces again: contacts may have pushed them there."""
     w: cython.pointer(Step) = cython.cast(cython.pointer(Step), what)
-    hold_block(w, w.awake[item])
+    solve_surfaces(w, w.awake[item], TASK_HOLD)
     if w.solids > 0:
         keep_sides(w, w.awake[item])
 
@@ -118,7 +99,7 @@ def drift_stage(what: cython.p_void, item: cython.int) -> cython.void:
     block: cython.int = w.awake[item]
     a: cython.Py_ssize_t = block * BLOCK
     if not w.linked:
-        hold_block(w, block)
+        solve_surfaces(w, block, TASK_HOLD)
         if w.collides and not w.lists.brute:
             keep_in_sight(w, block)
         if w.solids > 0:
@@ -134,8 +115,7 @@ def drift_stage(what: cython.p_void, item: cython.int) -> cython.void:
     if w.records_work:
         add_drift_work(w, block)
     if w.relaxes > 0:
-        for n in range(a, a + w.at_surface_count[block]):
-            relax_surfaces(w, w.at_surface[n], False)
+        solve_surfaces(w, block, TASK_RELAX)
 
 
 @kernel

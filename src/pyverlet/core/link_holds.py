@@ -11,7 +11,19 @@ from pyverlet.core.kernels import inlined, kernel
 from pyverlet.core.link_arrays import Links
 from pyverlet.core.step import Step
 from pyverlet.core.surface_contacts import excess_speed, keep_with_pair, passes_by
-from pyverlet.core.surface_rows import BEFORE_CHAIN, CONTACT, COULOMB, DRAG, GAP, NORMAL, PUSH, SPEED
+from pyverlet.core.surface_rows import (
+    BEFORE_CHAIN,
+    BEFORE_CHAIN_DRAG,
+    COULOMB,
+    DRAG,
+    GAP,
+    NORMAL,
+    NORMAL_Y,
+    PUSH,
+    SPEED,
+    SPEED_Y,
+    row_of,
+)
 from pyverlet.core.surfaces import add_surface_impulse
 
 WEDGED = cython.declare(cython.double, 1e-3)
@@ -23,7 +35,7 @@ Mobility = cython.struct(xx=cython.double, xy=cython.double, yy=cython.double)
 @inlined
 def share_along(k: cython.pointer(Links), i: cython.Py_ssize_t, c: cython.Py_ssize_t) -> cython.double:
     """Fraction of a tangential impulse that moves linked particle i: a disc with grip also rolls, and keeps two thirds."""
-    grips: cython.bint = fabs(k.contact[CONTACT * c + DRAG]) < k.contact[CONTACT * c + COULOMB] * k.contact[CONTACT * c + PUSH]
+    grips: cython.bint = fabs(k.contact[row_of(c) + DRAG]) < k.contact[row_of(c) + COULOMB] * k.contact[row_of(c) + PUSH]
     return k.ease[i] / (1 + k.ease[i]) if k.rough and k.has_friction[i] and grips else 1.0
 
 
@@ -35,8 +47,8 @@ def moved_by(k: cython.pointer(Links), i: cython.Py_ssize_t) -> Mobility:
     found.xx, found.xy, found.yy = own, 0, own
     c: cython.Py_ssize_t = k.held[i]
     if c >= 0:
-        x: cython.double = k.contact[CONTACT * c + NORMAL]
-        y: cython.double = k.contact[CONTACT * c + NORMAL + 1]
+        x: cython.double = k.contact[row_of(c) + NORMAL]
+        y: cython.double = k.contact[row_of(c) + NORMAL_Y]
         own *= share_along(k, i, c)
         found.xx, found.xy, found.yy = own * y * y, -own * x * y, own * x * x
     return found
@@ -56,9 +68,9 @@ def press(
     k: cython.pointer(Links), i: cython.Py_ssize_t, c: cython.Py_ssize_t, into: cython.double, slip: cython.double
 ) -> cython.void:
     """Let surface contact c absorb the velocity `into` it of linked particle i, with friction within Coulomb's cone."""
-    at: cython.Py_ssize_t = CONTACT * c
+    at: cython.Py_ssize_t = row_of(c)
     nx: cython.double = k.contact[at + NORMAL]
-    ny: cython.double = k.contact[at + NORMAL + 1]
+    ny: cython.double = k.contact[at + NORMAL_Y]
     into = max(into, -k.contact[at + PUSH])
     k.contact[at + PUSH] += into
     k.u[2 * i] -= into * nx
@@ -79,8 +91,8 @@ def move(k: cython.pointer(Links), i: cython.Py_ssize_t, x: cython.double, y: cy
     k.u[2 * i] += x
     k.u[2 * i + 1] += y
     if c >= 0:
-        nx: cython.double = k.contact[CONTACT * c + NORMAL]
-        ny: cython.double = k.contact[CONTACT * c + NORMAL + 1]
+        nx: cython.double = k.contact[row_of(c) + NORMAL]
+        ny: cython.double = k.contact[row_of(c) + NORMAL_Y]
         press(k, i, c, x * nx + y * ny, x * ny - y * nx)
 
 
@@ -102,8 +114,8 @@ def pulled_off(k: cython.pointer(Links), i: cython.Py_ssize_t, x: cython.double,
     c: cython.Py_ssize_t = k.held[i]
     if c < 0:
         return False
-    into: cython.double = k.weight[i] * (x * k.contact[CONTACT * c + NORMAL] + y * k.contact[CONTACT * c + NORMAL + 1])
-    if into >= -k.contact[CONTACT * c + PUSH]:
+    into: cython.double = k.weight[i] * (x * k.contact[row_of(c) + NORMAL] + y * k.contact[row_of(c) + NORMAL_Y])
+    if into >= -k.contact[row_of(c) + PUSH]:
         return False
     k.held[i] = -1
     return True
@@ -118,8 +130,8 @@ def find_hold(w: cython.pointer(Step), i: cython.Py_ssize_t) -> cython.void:
     k.held[i] = -1
     if k.own[i] > 0 and k.surfaces:
         for c in range(w.contact_begin[k.sorted_index[i]], w.contact_end[k.sorted_index[i]]):
-            if w.contact[CONTACT * c + PUSH] > most and w.contact[CONTACT * c + GAP] > -k.deepest:
-                most = w.contact[CONTACT * c + PUSH]
+            if w.contact[row_of(c) + PUSH] > most and w.contact[row_of(c) + GAP] > -k.deepest:
+                most = w.contact[row_of(c) + PUSH]
                 k.held[i] = cython.cast(int32_t, c)
 
 
@@ -131,8 +143,8 @@ def save_node(w: cython.pointer(Step), i: cython.Py_ssize_t) -> cython.void:
     k.begun[3 * i], k.begun[3 * i + 1], k.begun[3 * i + 2] = k.u[2 * i], k.u[2 * i + 1], k.rim[i]
     if k.surfaces:
         for c in range(w.contact_begin[k.sorted_index[i]], w.contact_end[k.sorted_index[i]]):
-            w.contact[CONTACT * c + BEFORE_CHAIN] = w.contact[CONTACT * c + PUSH]
-            w.contact[CONTACT * c + BEFORE_CHAIN + 1] = w.contact[CONTACT * c + DRAG]
+            w.contact[row_of(c) + BEFORE_CHAIN] = w.contact[row_of(c) + PUSH]
+            w.contact[row_of(c) + BEFORE_CHAIN_DRAG] = w.contact[row_of(c) + DRAG]
 
 
 @kernel
@@ -143,8 +155,8 @@ def restore_node(w: cython.pointer(Step), i: cython.Py_ssize_t) -> cython.void:
     k.u[2 * i], k.u[2 * i + 1], k.rim[i] = k.begun[3 * i], k.begun[3 * i + 1], k.begun[3 * i + 2]
     if k.surfaces:
         for c in range(w.contact_begin[k.sorted_index[i]], w.contact_end[k.sorted_index[i]]):
-            w.contact[CONTACT * c + PUSH] = w.contact[CONTACT * c + BEFORE_CHAIN]
-            w.contact[CONTACT * c + DRAG] = w.contact[CONTACT * c + BEFORE_CHAIN + 1]
+            w.contact[row_of(c) + PUSH] = w.contact[row_of(c) + BEFORE_CHAIN]
+            w.contact[row_of(c) + DRAG] = w.contact[row_of(c) + BEFORE_CHAIN_DRAG]
     find_hold(w, i)
 
 
@@ -156,15 +168,15 @@ def hold_node(w: cython.pointer(Step), i: cython.Py_ssize_t) -> cython.void:
     if k.own[i] == 0 or k.weight[i] == 0 or not k.surfaces:
         return
     for c in range(w.contact_begin[k.sorted_index[i]], w.contact_end[k.sorted_index[i]]):
-        first: cython.Py_ssize_t = CONTACT * c
+        first: cython.Py_ssize_t = row_of(c)
         if w.contact[first + GAP] < -k.deepest:
             continue
         before: cython.double = w.contact[first + PUSH]
         if before > 0 or (w.contact[first + GAP] < w.far and not passes_by(w, k.sorted_index[i], c, k.u[2 * i], k.u[2 * i + 1])):
             x: cython.double = k.u[2 * i] - w.contact[first + SPEED]
-            y: cython.double = k.u[2 * i + 1] - w.contact[first + SPEED + 1]
-            slip: cython.double = x * w.contact[first + NORMAL + 1] - y * w.contact[first + NORMAL] - k.rim[i]
-            press(k, i, c, excess_speed(w, first, k.u[2 * i], k.u[2 * i + 1]), slip)
+            y: cython.double = k.u[2 * i + 1] - w.contact[first + SPEED_Y]
+            slip: cython.double = x * w.contact[first + NORMAL_Y] - y * w.contact[first + NORMAL] - k.rim[i]
+            press(k, i, c, excess_speed(w, c, k.u[2 * i], k.u[2 * i + 1]), slip)
     find_hold(w, i)
 
 
@@ -176,11 +188,11 @@ def add_hold_impulses(w: cython.pointer(Step), i: cython.Py_ssize_t, share: cyth
     if k.own[i] == 0 or not k.surfaces:
         return
     for c in range(w.contact_begin[k.sorted_index[i]], w.contact_end[k.sorted_index[i]]):
-        first: cython.Py_ssize_t = CONTACT * c
+        first: cython.Py_ssize_t = row_of(c)
         jn: cython.double = share * w.rest_scale * w.contact[first + PUSH]
         jt: cython.double = share * w.rest_scale * w.contact[first + DRAG]
         nx: cython.double = w.contact[first + NORMAL]
-        ny: cython.double = w.contact[first + NORMAL + 1]
+        ny: cython.double = w.contact[first + NORMAL_Y]
         add_surface_impulse(w, k.sorted_index[i], c, jn, jt, nx, ny, False)
         if w.surface[c] < 0:
             keep_with_pair(w, c)

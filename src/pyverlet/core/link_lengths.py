@@ -12,7 +12,7 @@ from pyverlet.core.link_chains import CHORDS, LOST_WAY, WAVES, give, step_chain
 from pyverlet.core.link_holds import hold_node, let_go_of_wedged, mobility_along, restore_node, save_node
 from pyverlet.core.link_shapes import LinkWay, way_between
 from pyverlet.core.step import Step
-from pyverlet.core.surface_rows import CONTACT, SPEED
+from pyverlet.core.surface_rows import SPEED, SPEED_Y, row_of
 
 MOST_STEPS = cython.declare(cython.int, 40)
 LENGTH_SOLVED = cython.declare(cython.double, 1e-9)
@@ -70,7 +70,7 @@ def seen_from(k: cython.pointer(Links), first: cython.Py_ssize_t, end: cython.Py
         i: cython.Py_ssize_t = k.node[k.first[r]] if r < end else k.node[k.first[end - 1] + 1]
         c: cython.Py_ssize_t = k.held[i]
         if c >= 0:
-            mean.x, mean.y = k.contact[CONTACT * c + SPEED], k.contact[CONTACT * c + SPEED + 1]
+            mean.x, mean.y = k.contact[row_of(c) + SPEED], k.contact[row_of(c) + SPEED_Y]
             return mean
         if k.weight[i] == 0:
             mean.x, mean.y = k.u[2 * i], k.u[2 * i + 1]

@@ -17,7 +17,7 @@ from cython.cimports.libc.stdint import int64_t
 from pyverlet.core.kernels import inlined, kernel
 from pyverlet.core.obstacles import AFTER, BEFORE, BODY_OF, LENGTH, PLACE, SEGMENT, WAY
 from pyverlet.core.step import Step
-from pyverlet.core.surface_rows import CONTACT, DRAG, HELD, PUSH, ROLL, SIDES, is_one_way
+from pyverlet.core.surface_rows import DRAG, HELD, PUSH, ROLL, SIDES, is_one_way, row_of
 from pyverlet.core.surface_shapes import Path, Spot, path_of, spot_of
 
 OVERLAPS = cython.declare(cython.double, 1e-3)
@@ -107,19 +107,19 @@ def find_sides(w: cython.pointer(Step), i: cython.Py_ssize_t) -> cython.void:
             if w.segment[at + BODY_OF] != whose:
                 break
             side: Side = side_of(w, i, at)
-            held: cython.double = w.contact[CONTACT * end + HELD]
+            held: cython.double = w.contact[row_of(end) + HELD]
             overlaps |= side.overlaps
             passes |= side.overlaps and held < 0
             stays |= side.held and held > 0
             thrown |= side.held and held == 0 and side.overlaps and side.came
-            w.contact[CONTACT * end + HELD] = 1.0 if side.held else -1.0
+            w.contact[row_of(end) + HELD] = 1.0 if side.held else -1.0
             end += 1
         opens: cython.bint = overlaps and not stays and (passes or not thrown)
         for n in range(k, end):
-            if opens or w.contact[CONTACT * n + HELD] < 0:
-                w.contact[CONTACT * n + HELD] = -1.0
-                w.contact[CONTACT * n + PUSH] = w.contact[CONTACT * n + DRAG] = w.contact[CONTACT * n + ROLL] = 0
-                w.clear[3 * w.contact_begin[i] + 2] = 0
+            if opens or w.contact[row_of(n) + HELD] < 0:
+                w.contact[row_of(n) + HELD] = -1.0
+                w.contact[row_of(n) + PUSH] = w.contact[row_of(n) + DRAG] = w.contact[row_of(n) + ROLL] = 0
+                forget_clear(w, i)
         k = end
 
 
@@ -132,5 +132,5 @@ def stops(w: cython.pointer(Step), i: cython.Py_ssize_t, segment: cython.Py_ssiz
         return False
     for k in range(w.contact_begin[i], w.contact_end[i]):
         if w.surface[k] == SIDES + segment:
-            return w.contact[CONTACT * k + HELD] > 0
+            return w.contact[row_of(k) + HELD] > 0
     return True  # it was far away

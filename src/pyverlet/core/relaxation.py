@@ -20,8 +20,8 @@ from pyverlet.core.links import relax_links
 from pyverlet.core.pair_groups import busy_group, each_busy
 from pyverlet.core.spans import RELAX
 from pyverlet.core.step import Step
-from pyverlet.core.surface_contacts import relax_surfaces
-from pyverlet.core.surface_rows import CONTACT, NORMAL, PUSH, SPEED
+from pyverlet.core.surface_batches import TASK_RELAX, TASK_RELAX_AGAIN, solve_surfaces
+from pyverlet.core.surface_rows import NORMAL, NORMAL_Y, PUSH, SPEED, SPEED_Y, row_of
 from pyverlet.core.work import energy_of
 
 MOST_SWEEPS = cython.declare(cython.int, 100)
@@ -48,11 +48,11 @@ def is_driven(w: cython.pointer(Step), i: cython.Py_ssize_t) -> cython.bint:
     """Whether a moving surface has pushed particle i in this substep; motion along the surface counts only with friction."""
     row: cython.pointer(cython.double) = w.contact
     for k in range(w.contact_begin[i], w.contact_end[i]):
-        at: cython.Py_ssize_t = CONTACT * k
+        at: cython.Py_ssize_t = row_of(k)
         if row[at + PUSH] != 0 or w.since[i] > 0:
             x: cython.double = row[at + SPEED]
-            y: cython.double = row[at + SPEED + 1]
-            if x * row[at + NORMAL] + y * row[at + NORMAL + 1] != 0 or (w.rough and (x != 0 or y != 0)):
+            y: cython.double = row[at + SPEED_Y]
+            if x * row[at + NORMAL] + y * row[at + NORMAL_Y] != 0 or (w.rough and (x != 0 or y != 0)):
                 return True
     return False
 
@@ -108,10 +108,7 @@ def is_crowded(w: cython.pointer(Step)) -> cython.bint:
 def relax_surfaces_stage(what: cython.p_void, item: cython.int) -> cython.void:
     """Relax surface contacts of a block, in sweeps after the first."""
     w: cython.pointer(Step) = cython.cast(cython.pointer(Step), what)
-    block: cython.Py_ssize_t = w.awake[item]
-    n: cython.Py_ssize_t
-    for n in range(block * BLOCK, block * BLOCK + w.at_surface_count[block]):
-        relax_surfaces(w, w.at_surface[n], not w.linked)
+    solve_surfaces(w, w.awake[item], TASK_RELAX if w.linked else TASK_RELAX_AGAIN)
 
 
 @kernel

@@ -169,11 +169,12 @@ Step = cython.struct(
     contact_capacity=cython.Py_ssize_t,  # number of places
     contact_begin=cython.pointer(int32_t),  # (count,) first place of each particle, and the one after its last
     contact_end=cython.pointer(int32_t),
+    contact_particle=cython.pointer(uint32_t),  # (contact_capacity,) whose contact it is
     surface=cython.pointer(int32_t),  # (room,) a side of the room, or SIDES + segment
-    contact=cython.pointer(cython.double),  # (contact_capacity, CONTACT) see `core.surface_shapes`
+    contact=cython.pointer(cython.double),  # (contact_capacity, CONTACT) see `core.surface_rows`
     clear=cython.pointer(
         cython.double
-    ),  # (contact_capacity, 3) at the first: position, and distance of unloaded surfaces then; 0: unknown
+    ),  # (contact_capacity, 3) position, and distance of unloaded surfaces then, 0: unknown; by eights, too
     old_surface=cython.pointer(int32_t),  # of the previous list
     old_contact=cython.pointer(cython.double),
     segments=cython.Py_ssize_t,

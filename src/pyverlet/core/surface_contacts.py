@@ -13,12 +13,12 @@ from pyverlet.core.step import Step
 from pyverlet.core.surface_passing import passes_by
 from pyverlet.core.surface_rows import (
     BEND,
-    CONTACT,
     COULOMB,
     DRAG,
     FARAWAY,
     GAP,
     NORMAL,
+    NORMAL_Y,
     PUSH,
     ROLL,
     ROLL_MOST,
@@ -26,8 +26,10 @@ from pyverlet.core.surface_rows import (
     SEEN,
     SIDES,
     SPEED,
+    SPEED_Y,
     SPIN,
     keep_with_pair,
+    row_of,
 )
 from pyverlet.core.surface_shapes import measure_surface
 from pyverlet.core.surfaces import (
@@ -64,18 +66,42 @@ SETTLED = cython.declare(cython.double, 1e-5)
 
 
 @inlined
-def excess_speed(w: cython.pointer(Step), first: cython.Py_ssize_t, vx: cython.double, vy: cython.double) -> cython.double:
+def bend_excess(slip: cython.double, slide: cython.double) -> cython.double:
+    """By how much a curved surface recedes from the tangent in a substep, m/s; slide: the angle turned by, a small one.
+
+    1 - cos(s) = s^2 (1/2 + s^2 / 8) to fourth order, if s is the sine of the angle.
+    """
+    return slip * slide * (0.5 + 0.125 * (slide * slide))
+
+
+@inlined
+def bend_change(
+    x: cython.double, y: cython.double, tangent: cython.double, h: cython.double, bend: cython.double
+) -> cython.double:  # fmt: skip
+    """Upper bound of the change of `bend_excess` by friction `tangent`, m/s; (x, y): velocity relative to the surface."""
+    return (fabs(x) + fabs(y) + 0.5 * fabs(tangent)) * fabs(tangent) * h * fabs(bend)
+
+
+@inlined
+def dragged(had: cython.double, slip: cython.double, ease: cython.double, most: cython.double) -> cython.double:
+    """The tangential impulse over the mass, of which it had a part, that stops the slip, at most `most`, m/s."""
+    return min(max(had - slip * (1 / (1 + ease)), -most), most)
+
+
+@inlined
+def excess_speed(w: cython.pointer(Step), k: cython.Py_ssize_t, vx: cython.double, vy: cython.double) -> cython.double:
     """Speed into a surface beyond that at which the rim just reaches it in this substep, m/s.
 
     Particles inside a pinned circle are separated no faster than from others.
     """
     row: cython.pointer(cython.double) = w.contact
+    first: cython.Py_ssize_t = row_of(k)
     nx: cython.double = row[first + NORMAL]
-    ny: cython.double = row[first + NORMAL + 1]
+    ny: cython.double = row[first + NORMAL_Y]
     ux: cython.double = vx - row[first + SPEED]
-    uy: cython.double = vy - row[first + SPEED + 1]
+    uy: cython.double = vy - row[first + SPEED_Y]
     nearer: cython.double = row[first + GAP] / w.h
-    if w.surface[first // CONTACT] < 0:
+    if w.surface[k] < 0:
         nearer = max(nearer, -cython.cast(cython.double, w.push))
     speed: cython.double = ux * nx + uy * ny - nearer
     bend: cython.double = row[first + BEND]
@@ -84,7 +110,7 @@ def excess_speed(w: cython.pointer(Step), first: cython.Py_ssize_t, vx: cython.d
         slide: cython.double = slip * w.h * bend
         square: cython.double = slide * slide
         if square < SMALL_ANGLE:
-            speed += slip * slide * (0.5 + 0.125 * square)
+            speed += bend_excess(slip, slide)
         else:
             speed += slip * slide / (1 + sqrt(1 - square)) if square < 1 else 1 / (bend * w.h)
     return speed
@@ -128,14 +154,14 @@ def hold(
     Returns the absolute change of the impulse.
     """
     row: cython.pointer(cython.double) = w.contact
-    first: cython.Py_ssize_t = CONTACT * k
+    first: cython.Py_ssize_t = row_of(k)
     width: cython.Py_ssize_t = 4 if w.rough else 2
     v: cython.pointer(real) = w.motion if w.rough else w.velocity
     nx: cython.double = row[first + NORMAL]
-    ny: cython.double = row[first + NORMAL + 1]
+    ny: cython.double = row[first + NORMAL_Y]
     before: cython.double = row[first + PUSH]
     ux: cython.double = v[width * i] - row[first + SPEED]
-    uy: cython.double = v[width * i + 1] - row[first + SPEED + 1]
+    uy: cython.double = v[width * i + 1] - row[first + SPEED_Y]
     speed: cython.double = ux * nx + uy * ny
     if relax:  # velocity in the middle of the substep, along the chord of a curved path
         if row[first + BEND] != 0:
@@ -145,22 +171,20 @@ def hold(
     else:
         if before == 0 and passes_by(w, i, k, v[width * i], v[width * i + 1]):
             return 0.0
-        speed = excess_speed(w, first, v[width * i], v[width * i + 1])
+        speed = excess_speed(w, k, v[width * i], v[width * i + 1])
     after: cython.double = max(before + speed - leak * before, 0.0)
     if before == 0 and after == 0:
         return 0.0
     row[first + PUSH] = after
     if after == 0:
-        w.clear[3 * w.contact_begin[i] + 2] = 0
+        forget_clear(w, i)
     tangent: cython.double = 0.0
     if has_friction:
         ux -= (after - before) * nx
         uy -= (after - before) * ny
         slip: cython.double = ux * ny - uy * nx - v[4 * i + 2] * w.radius[i]
-        most: cython.double = row[first + COULOMB] * after
         old: cython.double = row[first + DRAG]
-        ease: cython.double = w.ease[w.mixed * i]
-        row[first + DRAG] = min(max(old - slip * (1 / (1 + ease)), -most), most)  # off the critical path
+        row[first + DRAG] = dragged(old, slip, w.ease[w.mixed * i], row[first + COULOMB] * after)
         tangent = row[first + DRAG] - old
         if w.rolls:
             hold_roll(w, i, first, after, tangent)
@@ -175,21 +199,21 @@ def hold_two(
     w: cython.pointer(Step), i: cython.Py_ssize_t, k: cython.Py_ssize_t, o: cython.Py_ssize_t, limit: cython.double
 ) -> cython.void:
     """Solve two loaded surfaces of a corner directly, as sweeps would converge slowly."""
-    a: cython.Py_ssize_t = CONTACT * k
-    b: cython.Py_ssize_t = CONTACT * o
+    a: cython.Py_ssize_t = row_of(k)
+    b: cython.Py_ssize_t = row_of(o)
     row: cython.pointer(cython.double) = w.contact
     width: cython.Py_ssize_t = 4 if w.rough else 2
     v: cython.pointer(real) = w.motion if w.rough else w.velocity
-    across: cython.double = row[a + NORMAL] * row[b + NORMAL + 1] - row[a + NORMAL + 1] * row[b + NORMAL]
+    across: cython.double = row[a + NORMAL] * row[b + NORMAL_Y] - row[a + NORMAL_Y] * row[b + NORMAL]
     if across * across < PARALLEL:
         return
-    along: cython.double = row[a + NORMAL] * row[b + NORMAL] + row[a + NORMAL + 1] * row[b + NORMAL + 1]
-    first: cython.double = excess_speed(w, a, v[width * i], v[width * i + 1])
-    second: cython.double = excess_speed(w, b, v[width * i], v[width * i + 1])
+    along: cython.double = row[a + NORMAL] * row[b + NORMAL] + row[a + NORMAL_Y] * row[b + NORMAL_Y]
+    first: cython.double = excess_speed(w, k, v[width * i], v[width * i + 1])
+    second: cython.double = excess_speed(w, o, v[width * i], v[width * i + 1])
     more: cython.double = (first - along * second) / (across * across)
     other: cython.double = (second - along * first) / (across * across)
     ux: cython.double = v[width * i] - more * row[a + NORMAL] - other * row[b + NORMAL]
-    uy: cython.double = v[width * i + 1] - more * row[a + NORMAL + 1] - other * row[b + NORMAL + 1]
+    uy: cython.double = v[width * i + 1] - more * row[a + NORMAL_Y] - other * row[b + NORMAL_Y]
     if row[a + PUSH] + more > 0 and row[b + PUSH] + other > 0 and ux * ux + uy * uy <= limit * limit:
         row[a + PUSH] += more
         row[b + PUSH] += other
@@ -197,8 +221,8 @@ def hold_two(
             keep_with_pair(w, k)
         if w.surface[o] < 0:
             keep_with_pair(w, o)
-        push_off(w, i, k, more, 0, row[a + NORMAL], row[a + NORMAL + 1])
-        push_off(w, i, o, other, 0, row[b + NORMAL], row[b + NORMAL + 1])
+        push_off(w, i, k, more, 0, row[a + NORMAL], row[a + NORMAL_Y])
+        push_off(w, i, o, other, 0, row[b + NORMAL], row[b + NORMAL_Y])
 
 
 @inlined
@@ -208,15 +232,14 @@ def turns_away(w: cython.pointer(Step), i: cython.Py_ssize_t, k: cython.Py_ssize
     Buckled chains amplify what is left, so with links every curvature counts.
     """
     row: cython.pointer(cython.double) = w.contact
-    first: cython.Py_ssize_t = CONTACT * k
+    first: cython.Py_ssize_t = row_of(k)
     if row[first + BEND] == 0:
         return False
     width: cython.Py_ssize_t = 4 if w.rough else 2
     v: cython.pointer(real) = w.motion if w.rough else w.velocity
-    x: cython.double = v[width * i] - row[first + SPEED] + row[first + RUNS] * row[first + NORMAL + 1]
-    y: cython.double = v[width * i + 1] - row[first + SPEED + 1] - row[first + RUNS] * row[first + NORMAL]
-    change: cython.double = (fabs(x) + fabs(y) + 0.5 * fabs(tangent)) * fabs(tangent) * w.h * fabs(row[first + BEND])
-    return change > SETTLED * row[first + PUSH] or w.linked
+    x: cython.double = v[width * i] - row[first + SPEED] + row[first + RUNS] * row[first + NORMAL_Y]
+    y: cython.double = v[width * i + 1] - row[first + SPEED_Y] - row[first + RUNS] * row[first + NORMAL]
+    return bend_change(x, y, tangent, w.h, row[first + BEND]) > SETTLED * row[first + PUSH] or w.linked
 
 
 @kernel
@@ -236,7 +259,7 @@ def hold_all(
     limit: cython.double = -1  # not known yet
     faster: cython.double = 0  # while surfaces counteract each other
     for k in range(w.contact_begin[i], w.contact_end[i]):
-        faster = max(faster, MOST_FASTER * w.contact[CONTACT * k + PUSH])
+        faster = max(faster, MOST_FASTER * w.contact[row_of(k) + PUSH])
     for turn in range(MOST_TURNS_AROUND):
         most: cython.double = 0
         loaded: cython.int = 0
@@ -244,13 +267,13 @@ def hold_all(
         one: cython.Py_ssize_t = -1
         change = 0
         for k in range(w.contact_begin[i], w.contact_end[i]):
-            if w.contact[CONTACT * k + GAP] < far or w.contact[CONTACT * k + PUSH] > 0:
-                drag: cython.double = w.contact[CONTACT * k + DRAG]
+            if w.contact[row_of(k) + GAP] < far or w.contact[row_of(k) + PUSH] > 0:
+                drag: cython.double = w.contact[row_of(k) + DRAG]
                 change = max(change, hold(w, i, k, False, 0, has_friction))
-                most = max(most, w.contact[CONTACT * k + PUSH])
-                if w.contact[CONTACT * k + PUSH] > 0:
+                most = max(most, w.contact[row_of(k) + PUSH])
+                if w.contact[row_of(k) + PUSH] > 0:
                     loaded += 1
-                    bends |= has_friction and turns_away(w, i, k, w.contact[CONTACT * k + DRAG] - drag)
+                    bends |= has_friction and turns_away(w, i, k, w.contact[row_of(k) + DRAG] - drag)
                     if loaded == 2 and turn % TOGETHER == 8:
                         hold_two(w, i, one, k, most_speed(w, i, came_x, came_y) + faster)
                     one = k
@@ -269,13 +292,13 @@ def hold_all(
 @inlined
 def undo_push(w: cython.pointer(Step), i: cython.Py_ssize_t, k: cython.Py_ssize_t, push: cython.double) -> cython.void:
     """Undo friction and rolling resistance of a contact in this substep, and the given part of its push."""
-    first: cython.Py_ssize_t = CONTACT * k
+    first: cython.Py_ssize_t = row_of(k)
     if push == 0 and w.contact[first + DRAG] == 0 and w.contact[first + ROLL] == 0:
         return
-    push_off(w, i, k, -push, -w.contact[first + DRAG], w.contact[first + NORMAL], w.contact[first + NORMAL + 1])
+    push_off(w, i, k, -push, -w.contact[first + DRAG], w.contact[first + NORMAL], w.contact[first + NORMAL_Y])
     turn_by(w, i, -w.contact[first + ROLL])
     w.contact[first + PUSH] -= push
-    w.clear[3 * w.contact_begin[i] + 2] = 0
+    forget_clear(w, i)
     w.contact[first + DRAG] = w.contact[first + ROLL] = 0
     if w.surface[k] < 0:
         keep_with_pair(w, k)
@@ -300,18 +323,18 @@ def forget_jam(w: cython.pointer(Step), i: cython.Py_ssize_t) -> cython.void:
     x: cython.double = 0
     y: cython.double = 0
     for k in range(w.contact_begin[i], w.contact_end[i]):
-        first: cython.Py_ssize_t = CONTACT * k
+        first: cython.Py_ssize_t = row_of(k)
         push: cython.double = w.contact[first + PUSH]
         if push > 0:
-            fast = max(fast, length(w.contact[first + SPEED], w.contact[first + SPEED + 1]))
+            fast = max(fast, length(w.contact[first + SPEED], w.contact[first + SPEED_Y]))
             pushes += push
             x += push * w.contact[first + NORMAL]
-            y += push * w.contact[first + NORMAL + 1]
+            y += push * w.contact[first + NORMAL_Y]
     # Fixed surfaces do not close, and surfaces that push in the same direction carry a load.
     if fast == 0 or excess <= MOST_FASTER * fast or 2 * length(x, y) > pushes:
         return
     for k in range(w.contact_begin[i], w.contact_end[i]):
-        undo_push(w, i, k, w.contact[CONTACT * k + PUSH])
+        undo_push(w, i, k, w.contact[row_of(k) + PUSH])
 
 
 @kernel
@@ -325,12 +348,12 @@ def hold_surfaces(w: cython.pointer(Step), i: cython.Py_ssize_t, clear: cython.b
     far: cython.double = -FARAWAY if clear else w.far
     unmoved: cython.bint = w.since[i] == 0 and not w.linked and not w.restless  # still where surfaces were measured
     for k in range(w.contact_begin[i], w.contact_end[i]):
-        loaded: cython.bint = w.contact[CONTACT * k + PUSH] > 0
+        loaded: cython.bint = w.contact[row_of(k) + PUSH] > 0
         if clear and not loaded:
             continue
         loads += loaded
         if not loaded and stays_off(w, i, k, w.far):
-            w.contact[CONTACT * k + GAP] = FARAWAY
+            w.contact[row_of(k) + GAP] = FARAWAY
         elif not (loaded and unmoved and w.surface[k] >= 0):
             measure_surface(w, i, k, False)
     if not clear:
@@ -357,7 +380,7 @@ def squeeze(w: cython.pointer(Step), i: cython.Py_ssize_t, far: cython.double) -
     for turn in range(MOST_TURNS_AROUND + 1):
         last: cython.bint = turn == MOST_TURNS_AROUND
         for k in range(w.contact_begin[i], w.contact_end[i]):
-            near: cython.bint = w.contact[CONTACT * k + GAP] < far or w.contact[CONTACT * k + PUSH] > 0
+            near: cython.bint = w.contact[row_of(k) + GAP] < far or w.contact[row_of(k) + PUSH] > 0
             if near and (not last or 0 <= w.surface[k] < SIDES):
                 hold(w, i, k, False, 0 if last else SQUEEZED, False)
 
@@ -367,7 +390,7 @@ def relax_surfaces(w: cython.pointer(Step), i: cython.Py_ssize_t, again: cython.
     """Remove the speed into loaded surfaces. again: positions relative to surfaces other than pinned circles are unchanged."""
     k: cython.Py_ssize_t
     for k in range(w.contact_begin[i], w.contact_end[i]):
-        if w.contact[CONTACT * k + PUSH] > 0:
+        if w.contact[row_of(k) + PUSH] > 0:
             if not again or w.surface[k] < 0:
                 measure_surface(w, i, k, True)
             hold(w, i, k, True, 0, w.rough)
@@ -382,7 +405,7 @@ def warm_surfaces(w: cython.pointer(Step), i: cython.Py_ssize_t) -> cython.void:
     if w.one_way:
         find_sides(w, i)
     for k in range(w.contact_begin[i], w.contact_end[i]):
-        first: cython.Py_ssize_t = CONTACT * k
+        first: cython.Py_ssize_t = row_of(k)
         if w.contact[first + PUSH] > 0:
             if not stands or w.surface[k] < 0 or way_from(w, i, w.contact, first + SEEN) > 0:
                 measure_surface(w, i, k, False)
@@ -396,4 +419,4 @@ def warm_surfaces(w: cython.pointer(Step), i: cython.Py_ssize_t) -> cython.void:
                     w.contact[first + ROLL] *= w.scale
                 turn_by(w, i, w.contact[first + ROLL])
             jt: cython.double = w.contact[first + DRAG] if w.rough else 0.0
-            push_off(w, i, k, w.contact[first + PUSH], jt, w.contact[first + NORMAL], w.contact[first + NORMAL + 1])
+            push_off(w, i, k, w.contact[first + PUSH], jt, w.contact[first + NORMAL], w.contact[first + NORMAL_Y])

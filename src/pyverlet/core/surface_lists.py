@@ -20,7 +20,6 @@ from pyverlet.core.pair_lists import INDEX_WORDS
 from pyverlet.core.segments import head_at
 from pyverlet.core.step import BOX, CAGE, NEAR, Step
 from pyverlet.core.surface_rows import (
-    CONTACT,
     DRAG,
     EVENT,
     EVENT_BOUNCES,
@@ -35,6 +34,7 @@ from pyverlet.core.surface_rows import (
     is_one_way,
     pinned_lane,
     pinned_sign,
+    row_of,
 )
 
 FASTER = cython.declare(cython.double, 2.2)
@@ -186,6 +186,13 @@ def count_stage(what: cython.p_void, block: cython.int) -> cython.void:
     w.at_surface_count[block] = cython.cast(int32_t, touching)
 
 
+@inlined
+def leave_empty(w: cython.pointer(Step), k: cython.Py_ssize_t, i: cython.Py_ssize_t) -> cython.void:
+    """Make place k one that carries nothing: eights are computed whole."""
+    w.contact_particle[k] = cython.cast(uint32_t, i)
+    w.contact[row_of(k) + PUSH] = 0
+
+
 @kernel
 def fill_surfaces_stage(what: cython.p_void, block: cython.int) -> cython.void:
     """List the surfaces of a block, with their contact state, from place contact_count on."""
@@ -193,6 +200,8 @@ def fill_surfaces_stage(what: cython.p_void, block: cython.int) -> cython.void:
     o: cython.Py_ssize_t
     n: cython.Py_ssize_t = block * BLOCK
     last: cython.Py_ssize_t = n + w.at_surface_count[block]
+    k: cython.Py_ssize_t
+    filled: cython.Py_ssize_t = w.contact_count[block]
     for i in range(block * BLOCK, min((block + 1) * BLOCK, w.count)):
         old_begin: cython.Py_ssize_t = w.contact_begin[i]
         old_end: cython.Py_ssize_t = w.contact_end[i]
@@ -200,28 +209,34 @@ def fill_surfaces_stage(what: cython.p_void, block: cython.int) -> cython.void:
         end: cython.Py_ssize_t = begin
         if n < last and w.at_surface[n] == i:
             end = see(w, i, begin, True)
-            w.clear[3 * begin + 2] = 0
             n += 1
         w.contact_begin[i], w.contact_end[i] = cython.cast(int32_t, begin), cython.cast(int32_t, end)
+        for k in range(filled, begin):
+            leave_empty(w, k, i)
+        filled = end
         for k in range(begin, end):
-            w.contact[CONTACT * k + PUSH] = w.contact[CONTACT * k + DRAG] = w.contact[CONTACT * k + ROLL] = 0
-            w.contact[CONTACT * k + HELD] = 0
-            w.contact[CONTACT * k + SEEN] = FARAWAY  # not measured yet
-            w.contact[CONTACT * k + EVENT_SPEED] = w.contact[CONTACT * k + EVENT_BOUNCES] = w.contact[CONTACT * k + EVENT] = 0
-            w.contact[CONTACT * k + EVENT_IMPULSE] = 0
+            w.contact_particle[k] = cython.cast(uint32_t, i)
+            w.clear[clear_of(k) + 16] = 0
+            w.contact[row_of(k) + PUSH] = w.contact[row_of(k) + DRAG] = w.contact[row_of(k) + ROLL] = 0
+            w.contact[row_of(k) + HELD] = 0
+            w.contact[row_of(k) + SEEN] = FARAWAY  # not measured yet
+            w.contact[row_of(k) + EVENT_SPEED] = w.contact[row_of(k) + EVENT_BOUNCES] = w.contact[row_of(k) + EVENT] = 0
+            w.contact[row_of(k) + EVENT_IMPULSE] = 0
             if w.surface[k] < 0:
-                w.contact[CONTACT * k + PUSH] = w.impulse[pinned_lane(w, k)]
-                w.contact[CONTACT * k + DRAG] = -w.tangent_impulse[pinned_lane(w, k)] if w.rough else 0
+                w.contact[row_of(k) + PUSH] = w.impulse[pinned_lane(w, k)]
+                w.contact[row_of(k) + DRAG] = -w.tangent_impulse[pinned_lane(w, k)] if w.rough else 0
                 if w.rolls:
-                    w.contact[CONTACT * k + ROLL] = pinned_sign(w, pinned_lane(w, k)) * w.roll_impulse[pinned_lane(w, k)]
+                    w.contact[row_of(k) + ROLL] = pinned_sign(w, pinned_lane(w, k)) * w.roll_impulse[pinned_lane(w, k)]
                 continue
             for o in range(old_begin, old_end):
                 if w.old_surface[o] == w.surface[k]:
-                    w.contact[CONTACT * k + PUSH] = w.old_contact[CONTACT * o + PUSH]
-                    w.contact[CONTACT * k + DRAG] = w.old_contact[CONTACT * o + DRAG]
-                    w.contact[CONTACT * k + ROLL] = w.old_contact[CONTACT * o + ROLL]
+                    w.contact[row_of(k) + PUSH] = w.old_contact[row_of(o) + PUSH]
+                    w.contact[row_of(k) + DRAG] = w.old_contact[row_of(o) + DRAG]
+                    w.contact[row_of(k) + ROLL] = w.old_contact[row_of(o) + ROLL]
                     if w.surface[k] >= SIDES and is_one_way(w, SEGMENT * (cython.cast(int64_t, w.surface[k]) - SIDES)):
-                        w.contact[CONTACT * k + HELD] = w.old_contact[CONTACT * o + HELD]
+                        w.contact[row_of(k) + HELD] = w.old_contact[row_of(o) + HELD]
+    for k in range(filled, (filled + 7) & -8):
+        leave_empty(w, k, block * BLOCK)
 
 
 @kernel
@@ -261,7 +276,7 @@ def list_surfaces(w: cython.pointer(Step)) -> cython.bint:
     for block in range(blocks):
         here: int64_t = w.contact_count[block]
         w.contact_count[block] = total
-        total += here
+        total += (here + 7) & -8  # the eights of a block are its own
     if total > w.contact_capacity:
         w.contact_count[0] = total
         return False

@@ -11,7 +11,7 @@ from pyverlet.core.event_recording import least_bounce
 from pyverlet.core.kernels import inlined, kernel
 from pyverlet.core.obstacles import LATE, SEGMENT
 from pyverlet.core.step import Step
-from pyverlet.core.surface_rows import BEND, CONTACT, GAP, NORMAL, RUNS, SIDES, SPEED
+from pyverlet.core.surface_rows import BEND, GAP, NORMAL, NORMAL_Y, RUNS, SIDES, SPEED, SPEED_Y, row_of
 from pyverlet.core.surface_shapes import Spot, spot_of
 
 
@@ -23,7 +23,7 @@ def ends_inside(w: cython.pointer(Step), first: cython.Py_ssize_t, ux: cython.do
         return False
     reach: cython.double = -1 / row[first + BEND]
     nx: cython.double = row[first + NORMAL]
-    ny: cython.double = row[first + NORMAL + 1]
+    ny: cython.double = row[first + NORMAL_Y]
     x: cython.double = (row[first + GAP] + reach) * nx - (ux + row[first + RUNS] * ny) * w.h
     y: cython.double = (row[first + GAP] + reach) * ny - (uy - row[first + RUNS] * nx) * w.h
     return x * x + y * y < reach * reach
@@ -53,17 +53,17 @@ def passes_by(
 ) -> cython.bint:
     """Whether particle i is so fast that, if it meets the obstacle of contact k at all, it has already bounced."""
     row: cython.pointer(cython.double) = w.contact
-    first: cython.Py_ssize_t = CONTACT * k
+    first: cython.Py_ssize_t = row_of(k)
     if 0 <= w.surface[k] < SIDES:
         return False
     if w.since[i] > 0 and w.surface[k] >= SIDES and leaves(w, i, k):
         return True
     nx: cython.double = row[first + NORMAL]
-    ny: cython.double = row[first + NORMAL + 1]
+    ny: cython.double = row[first + NORMAL_Y]
     ux: cython.double = vx - row[first + SPEED]
-    uy: cython.double = vy - row[first + SPEED + 1]
+    uy: cython.double = vy - row[first + SPEED_Y]
     least: cython.double = least_bounce(w, i)
     if ux * nx + uy * ny <= least:
         return False
-    free: cython.double = (w.free[2 * i] - row[first + SPEED]) * nx + (w.free[2 * i + 1] - row[first + SPEED + 1]) * ny
+    free: cython.double = (w.free[2 * i] - row[first + SPEED]) * nx + (w.free[2 * i + 1] - row[first + SPEED_Y]) * ny
     return free > least and not ends_inside(w, first, ux, uy)

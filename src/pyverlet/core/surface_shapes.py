@@ -30,18 +30,21 @@ from pyverlet.core.step import Step
 from pyverlet.core.surface_rows import (
     AWAY,
     BEND,
-    CONTACT,
     FARAWAY,
     GAP,
     NORMAL,
+    NORMAL_Y,
     RUNS,
     SEEN,
+    SEEN_Y,
     SIDES,
     SPEED,
+    SPEED_Y,
     is_passable,
     measure_pinned,
     measure_side,
     mix,
+    row_of,
 )
 
 Spot = cython.struct(
@@ -165,7 +168,7 @@ def measure_segment(w: cython.pointer(Step), i: cython.Py_ssize_t, k: cython.Py_
     """Measure the contact k of particle i with a segment; late: at the end of the substep."""
     at: cython.Py_ssize_t = SEGMENT * (cython.cast(int64_t, w.surface[k]) - SIDES)
     row: cython.pointer(cython.double) = w.contact
-    first: cython.Py_ssize_t = CONTACT * k
+    first: cython.Py_ssize_t = row_of(k)
     p: Spot = spot_of(w, i, at, LATE if late else PLACE)
     near: cython.double = min(max(p.x, 0.0), p.length)
     nx: cython.double = 0.0
@@ -208,17 +211,12 @@ def set_surface(
     row: cython.pointer(cython.double) = w.contact
     x: cython.double = p.c * nx - p.s * ny
     y: cython.double = p.s * nx + p.c * ny
-    row[first + NORMAL], row[first + NORMAL + 1] = x, y
+    row[first + NORMAL], row[first + NORMAL_Y] = x, y
     set_surface_speed(w, first, at, p.wx + w.radius[i] * x, p.wy + w.radius[i] * y, x, y, since)
-    mix(
-        w,
-        i,
-        first,
-        w.segment[at + RESTITUTION],
-        w.segment[at + FRICTION],
-        w.segment[at + ROLLS],
-        cython.cast(int64_t, w.segment[at + MATERIAL]),
-    )
+    if since == 0:
+        e: cython.double = w.segment[at + RESTITUTION]
+        material: cython.Py_ssize_t = cython.cast(int64_t, w.segment[at + MATERIAL])
+        mix(w, i, first, e, w.segment[at + FRICTION], w.segment[at + ROLLS], material)
     row[first + SPIN] = w.body[6 * cython.cast(int64_t, w.segment[at + BODY_OF]) + 5]
 
 
@@ -255,17 +253,17 @@ def set_surface_speed(
     ry: cython.double = y - (w.body[b + 1] + w.body[b + 4] * now)
     belt: cython.double = w.segment[at + BELT] * belt_share(w, at, nx, ny)
     w.contact[first + SPEED] = w.body[b + 3] - turn * ry + belt * ny
-    w.contact[first + SPEED + 1] = w.body[b + 4] + turn * rx - belt * nx
+    w.contact[first + SPEED_Y] = w.body[b + 4] + turn * rx - belt * nx
     w.contact[first + RUNS] = belt + turn * w.segment[at + ROUNDING]
 
 
 @kernel
 def measure_surface(w: cython.pointer(Step), i: cython.Py_ssize_t, k: cython.Py_ssize_t, late: cython.bint) -> cython.void:
-    """Measure contact k of particle i; late: at the end of the substep."""
+    """Measure contact k of particle i; late: at the end of the substep, after it was measured at its start."""
     if w.surface[k] < 0:
         measure_pinned(w, i, k, late)
     elif w.surface[k] < SIDES:
-        measure_side(w, i, k)
+        measure_side(w, i, k, late)
     else:
         measure_segment(w, i, k, late)
-    w.contact[CONTACT * k + SEEN], w.contact[CONTACT * k + SEEN + 1] = w.position[2 * i], w.position[2 * i + 1]
+    w.contact[row_of(k) + SEEN], w.contact[row_of(k) + SEEN_Y] = w.position[2 * i], w.position[2 * i + 1]

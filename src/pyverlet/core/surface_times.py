@@ -13,7 +13,7 @@ from pyverlet.core.impacts import NEVER
 from pyverlet.core.kernels import inlined, kernel
 from pyverlet.core.obstacles import AFTER, BEFORE, BODY_OF, FACES, PLACE, SEGMENT
 from pyverlet.core.step import CAGE, Step
-from pyverlet.core.surface_rows import CONTACT, GAP, NORMAL, ROUNDED, SIDES, SPEED, is_passable, pinned_lane
+from pyverlet.core.surface_rows import GAP, NORMAL, NORMAL_Y, ROUNDED, SIDES, SPEED, SPEED_Y, is_passable, pinned_lane, row_of
 from pyverlet.core.surface_shapes import Path, Spot, path_of, set_surface_speed, spot_of
 
 Hit = cython.struct(time=cython.double, nx=cython.double, ny=cython.double)
@@ -95,7 +95,7 @@ def time_to_side(w: cython.pointer(Step), i: cython.Py_ssize_t, k: cython.Py_ssi
     """When particle i hits the side of contact k."""
     hit: Hit
     row: cython.pointer(cython.double) = w.contact
-    first: cython.Py_ssize_t = CONTACT * k
+    first: cython.Py_ssize_t = row_of(k)
     width: cython.Py_ssize_t = 4 if w.rough else 2
     v: cython.pointer(real) = w.motion if w.rough else w.velocity
     ux: cython.double = v[width * i]
@@ -106,7 +106,7 @@ def time_to_side(w: cython.pointer(Step), i: cython.Py_ssize_t, k: cython.Py_ssi
         x: cython.double = w.position[2 * i] - w.x0
         y: cython.double = w.position[2 * i + 1] - w.y0
         return time_to_round(x, y, ux, uy, ax, ay, w.x1 - w.radius[i], w.h, since, True)
-    hit.nx, hit.ny = row[first + NORMAL], row[first + NORMAL + 1]
+    hit.nx, hit.ny = row[first + NORMAL], row[first + NORMAL_Y]
     hit.time = flat_time(row[first + GAP], ux * hit.nx + uy * hit.ny, ax * hit.nx + ay * hit.ny, w.h, since)
     return hit
 
@@ -115,7 +115,7 @@ def time_to_side(w: cython.pointer(Step), i: cython.Py_ssize_t, k: cython.Py_ssi
 def time_to_pinned(w: cython.pointer(Step), i: cython.Py_ssize_t, k: cython.Py_ssize_t, since: cython.double) -> Hit:
     """When particle i hits the pinned circle of contact k."""
     row: cython.pointer(cython.double) = w.contact
-    first: cython.Py_ssize_t = CONTACT * k
+    first: cython.Py_ssize_t = row_of(k)
     lane: cython.Py_ssize_t = pinned_lane(w, k)
     width: cython.Py_ssize_t = 4 if w.rough else 2
     v: cython.pointer(real) = w.motion if w.rough else w.velocity
@@ -125,7 +125,7 @@ def time_to_pinned(w: cython.pointer(Step), i: cython.Py_ssize_t, k: cython.Py_s
     ux: cython.double = v[width * i] - cython.cast(cython.double, v[width * j])
     uy: cython.double = v[width * i + 1] - cython.cast(cython.double, v[width * j + 1])
     x: cython.double = -d * row[first + NORMAL]
-    y: cython.double = -d * row[first + NORMAL + 1]
+    y: cython.double = -d * row[first + NORMAL_Y]
     return time_to_round(x, y, ux, uy, w.acceleration[2 * i], w.acceleration[2 * i + 1], reach, w.h, since, False)
 
 
@@ -134,10 +134,10 @@ def time_to_segment(w: cython.pointer(Step), i: cython.Py_ssize_t, k: cython.Py_
     """When particle i hits the segment of contact k: its face, or an end."""
     hit: Hit
     row: cython.pointer(cython.double) = w.contact
-    first: cython.Py_ssize_t = CONTACT * k
+    first: cython.Py_ssize_t = row_of(k)
     at: cython.Py_ssize_t = SEGMENT * (cython.cast(int64_t, w.surface[k]) - SIDES)
     h: cython.double = w.h
-    hit.time, hit.nx, hit.ny = NEVER, row[first + NORMAL], row[first + NORMAL + 1]
+    hit.time, hit.nx, hit.ny = NEVER, row[first + NORMAL], row[first + NORMAL_Y]
     if since == 0 and row[first + GAP] <= 0:
         hit.time = 0.0
         return hit
@@ -190,10 +190,10 @@ def time_to_surface(w: cython.pointer(Step), i: cython.Py_ssize_t, k: cython.Py_
 def set_speed(w: cython.pointer(Step), i: cython.Py_ssize_t, k: cython.Py_ssize_t, hit: cython.pointer(Hit)) -> cython.void:
     """Set the velocity of the surface of contact k at the point of impact."""
     row: cython.pointer(cython.double) = w.contact
-    first: cython.Py_ssize_t = CONTACT * k
+    first: cython.Py_ssize_t = row_of(k)
     width: cython.Py_ssize_t = 4 if w.rough else 2
     v: cython.pointer(real) = w.motion if w.rough else w.velocity
-    turn: cython.double = row[first + SPEED] * row[first + NORMAL + 1] - row[first + SPEED + 1] * row[first + NORMAL]
+    turn: cython.double = row[first + SPEED] * row[first + NORMAL_Y] - row[first + SPEED_Y] * row[first + NORMAL]
     if w.surface[k] >= SIDES:
         at: cython.Py_ssize_t = SEGMENT * (cython.cast(int64_t, w.surface[k]) - SIDES)
         half: cython.double = 0.5 * hit.time * (w.h - hit.time)
@@ -203,9 +203,9 @@ def set_speed(w: cython.pointer(Step), i: cython.Py_ssize_t, k: cython.Py_ssize_
         y += v[width * i + 1] * hit.time - w.acceleration[2 * i + 1] * half
         set_surface_speed(w, first, at, x + w.radius[i] * hit.nx, y + w.radius[i] * hit.ny, hit.nx, hit.ny, hit.time)
     elif w.surface[k] >= 0:  # for a cage; 0 for others
-        row[first + SPEED], row[first + SPEED + 1] = turn * hit.ny, -turn * hit.nx
+        row[first + SPEED], row[first + SPEED_Y] = turn * hit.ny, -turn * hit.nx
     else:
         lane: cython.Py_ssize_t = pinned_lane(w, k)
         j: cython.Py_ssize_t = w.j[lane] if cython.cast(cython.Py_ssize_t, w.i[lane]) == i else w.i[lane]
         turn = w.motion[4 * j + 2] * cython.cast(cython.double, w.radius[j]) if w.rough else 0.0
-        row[first + SPEED], row[first + SPEED + 1] = v[width * j] + turn * hit.ny, v[width * j + 1] - turn * hit.nx
+        row[first + SPEED], row[first + SPEED_Y] = v[width * j] + turn * hit.ny, v[width * j + 1] - turn * hit.nx

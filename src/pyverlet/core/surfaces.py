@@ -12,19 +12,7 @@ from pyverlet.core.impacts import NEVER, strike
 from pyverlet.core.kernels import inlined, kernel
 from pyverlet.core.rebounds import REBOUND, STAMP, node_of, store_rebound
 from pyverlet.core.step import Step
-from pyverlet.core.surface_rows import (
-    AWAY,
-    BOUNCE,
-    CONTACT,
-    COULOMB,
-    FARAWAY,
-    GAP,
-    GIVEN,
-    PUSH,
-    SEEN,
-    SPEED,
-    pinned_lane,
-)
+from pyverlet.core.surface_rows import AWAY, BOUNCE, COULOMB, FARAWAY, GAP, GIVEN, PUSH, SEEN, SPEED, SPEED_Y, pinned_lane, row_of
 from pyverlet.core.surface_shapes import measure_surface
 from pyverlet.core.surface_times import Hit, set_speed, time_to_surface
 from pyverlet.core.work import add_belt_work, add_place_work
@@ -52,8 +40,9 @@ def speed_limit(w: cython.pointer(Step), i: cython.Py_ssize_t, x: cython.double,
     fast: cython.double = 0
     k: cython.Py_ssize_t
     for k in range(w.contact_begin[i], w.contact_end[i]):
-        at: cython.Py_ssize_t = CONTACT * k + SPEED
-        fast = max(fast, w.contact[at] * w.contact[at] + w.contact[at + 1] * w.contact[at + 1])
+        x_speed: cython.double = w.contact[row_of(k) + SPEED]
+        y_speed: cython.double = w.contact[row_of(k) + SPEED_Y]
+        fast = max(fast, x_speed * x_speed + y_speed * y_speed)
     fast = max(max(sqrt(fast), w.rest_speed), w.h * length(w.acceleration[2 * i], w.acceleration[2 * i + 1]))
     return 1.01 * length(x, y) + MOST_FASTER * fast  # 1.01 for rounding
 
@@ -75,7 +64,7 @@ def most_speed(w: cython.pointer(Step), i: cython.Py_ssize_t, x: cython.double, 
     k: cython.Py_ssize_t
     out: cython.double = 0
     for k in range(w.contact_begin[i], w.contact_end[i]):
-        deep: cython.double = -w.contact[CONTACT * k + GAP] / w.h
+        deep: cython.double = -w.contact[row_of(k) + GAP] / w.h
         out = max(out, min(deep, cython.cast(cython.double, w.push)) if w.surface[k] < 0 else deep)
     return speed_limit(w, i, x, y) + MOST_OUT * out
 
@@ -128,14 +117,14 @@ def push_off(
 def bounce_at(w: cython.pointer(Step), i: cython.Py_ssize_t, k: cython.Py_ssize_t, hit: cython.pointer(Hit)) -> cython.void:
     """Resolve an impact on the surface of contact k."""
     row: cython.pointer(cython.double) = w.contact
-    first: cython.Py_ssize_t = CONTACT * k
+    first: cython.Py_ssize_t = row_of(k)
     width: cython.Py_ssize_t = 4 if w.rough else 2
     v: cython.pointer(real) = w.motion if w.rough else w.velocity
     nx: cython.double = hit.nx
     ny: cython.double = hit.ny
     back: cython.double = hit.time - 0.5 * cython.cast(cython.double, w.h)
     ux: cython.double = v[width * i] - row[first + SPEED] + w.acceleration[2 * i] * back
-    uy: cython.double = v[width * i + 1] - row[first + SPEED + 1] + w.acceleration[2 * i + 1] * back
+    uy: cython.double = v[width * i + 1] - row[first + SPEED_Y] + w.acceleration[2 * i + 1] * back
     speed: cython.double = ux * nx + uy * ny
     given: cython.double = (1 + row[first + BOUNCE]) * speed
     strike(w, i, -given * nx, -given * ny, 0, hit.time)
@@ -170,7 +159,7 @@ def bounce_at(w: cython.pointer(Step), i: cython.Py_ssize_t, k: cython.Py_ssize_
 def impact_with(w: cython.pointer(Step), i: cython.Py_ssize_t, k: cython.Py_ssize_t, since: cython.double) -> Hit:
     """When particle i hits the surface of contact k faster than resting contacts do; NEVER: not in this substep."""
     row: cython.pointer(cython.double) = w.contact
-    first: cython.Py_ssize_t = CONTACT * k
+    first: cython.Py_ssize_t = row_of(k)
     width: cython.Py_ssize_t = 4 if w.rough else 2
     v: cython.pointer(real) = w.motion if w.rough else w.velocity
     hit: Hit = time_to_surface(w, i, k, since)
@@ -178,7 +167,7 @@ def impact_with(w: cython.pointer(Step), i: cython.Py_ssize_t, k: cython.Py_ssiz
         return hit
     set_speed(w, i, k, cython.address(hit))
     sx: cython.double = row[first + SPEED]
-    sy: cython.double = row[first + SPEED + 1]
+    sy: cython.double = row[first + SPEED_Y]
     back: cython.double = hit.time - 0.5 * cython.cast(cython.double, w.h)
     ux: cython.double = v[width * i] + w.acceleration[2 * i] * back - sx
     uy: cython.double = v[width * i + 1] + w.acceleration[2 * i + 1] * back - sy
@@ -203,15 +192,15 @@ def has_rebounds(w: cython.pointer(Step), i: cython.Py_ssize_t) -> cython.bint:
 @inlined
 def supports(w: cython.pointer(Step), i: cython.Py_ssize_t, k: cython.Py_ssize_t) -> cython.bint:
     """Whether the surface of contact k carries particle i, which then does not bounce unless a pair has thrown it there."""
-    if w.restless or w.contact[CONTACT * k + PUSH] == 0:
+    if w.restless or w.contact[row_of(k) + PUSH] == 0:
         return False
-    return w.thrown[i] == 0 or w.contact[CONTACT * k + BOUNCE] == 0
+    return w.thrown[i] == 0 or w.contact[row_of(k) + BOUNCE] == 0
 
 
 @inlined
 def way_from(w: cython.pointer(Step), i: cython.Py_ssize_t, place: cython.p_double, at: cython.Py_ssize_t) -> cython.double:
-    """Upper bound of the distance of particle i from a place whose coordinates begin at `at`, m."""
-    return fabs(w.position[2 * i] - place[at]) + fabs(w.position[2 * i + 1] - place[at + 1])
+    """Upper bound of the distance of particle i from a place whose coordinates are at `at` and `at` + 8, m."""
+    return fabs(w.position[2 * i] - place[at]) + fabs(w.position[2 * i + 1] - place[at + 8])
 
 
 @inlined
@@ -227,7 +216,7 @@ def way_ahead(w: cython.pointer(Step), i: cython.Py_ssize_t) -> cython.double:
 @inlined
 def stays_off(w: cython.pointer(Step), i: cython.Py_ssize_t, k: cython.Py_ssize_t, far: cython.double) -> cython.bint:
     """Whether particle i is more than `far` m from the surface of contact k, which does not carry it, when last measured."""
-    first: cython.Py_ssize_t = CONTACT * k
+    first: cython.Py_ssize_t = row_of(k)
     away: cython.double = 0 if w.linked or w.contact[first + PUSH] != 0 else w.contact[first + AWAY]
     return 2 * (way_from(w, i, w.contact, first + SEEN) + far) < away
 
@@ -238,10 +227,19 @@ def update_clear(w: cython.pointer(Step), i: cython.Py_ssize_t) -> cython.void:
     k: cython.Py_ssize_t
     least: cython.double = FARAWAY
     for k in range(w.contact_begin[i], w.contact_end[i]):
-        if w.restless or w.contact[CONTACT * k + PUSH] == 0:
-            least = min(least, w.contact[CONTACT * k + AWAY] - way_from(w, i, w.contact, CONTACT * k + SEEN))
-    at: cython.Py_ssize_t = 3 * w.contact_begin[i]
-    w.clear[at], w.clear[at + 1], w.clear[at + 2] = w.position[2 * i], w.position[2 * i + 1], least
+        if w.restless or w.contact[row_of(k) + PUSH] == 0:
+            least = min(least, w.contact[row_of(k) + AWAY] - way_from(w, i, w.contact, row_of(k) + SEEN))
+    for k in range(w.contact_begin[i], w.contact_end[i]):
+        at: cython.Py_ssize_t = clear_of(k)
+        w.clear[at], w.clear[at + 8], w.clear[at + 16] = w.position[2 * i], w.position[2 * i + 1], least
+
+
+@inlined
+def forget_clear(w: cython.pointer(Step), i: cython.Py_ssize_t) -> cython.void:
+    """Have the surfaces of particle i measured again: one of them no longer carries it."""
+    k: cython.Py_ssize_t
+    for k in range(w.contact_begin[i], w.contact_end[i]):
+        w.clear[clear_of(k) + 16] = 0
 
 
 @inlined
@@ -250,10 +248,10 @@ def keeps_clear(w: cython.pointer(Step), i: cython.Py_ssize_t) -> cython.bint:
 
     Most listed surfaces need not be measured then. Chains of links may throw it farther than its velocity says.
     """
-    at: cython.Py_ssize_t = 3 * w.contact_begin[i]
-    if w.linked or w.clear[at + 2] <= 0:
+    at: cython.Py_ssize_t = clear_of(w.contact_begin[i])
+    if w.linked or w.clear[at + 16] <= 0:
         return False
-    return 2 * (way_from(w, i, w.clear, at) + way_ahead(w, i)) < w.clear[at + 2]
+    return 2 * (way_from(w, i, w.clear, at) + way_ahead(w, i)) < w.clear[at + 16]
 
 
 @inlined
@@ -292,6 +290,6 @@ def bounce_surfaces(w: cython.pointer(Step), i: cython.Py_ssize_t) -> cython.bin
             break
     # Between closing surfaces it would accelerate without end: it stops at the last one. In a fixed corner all but elastic
     # surfaces slow it down.
-    if n + 1 < MOST_BOUNCES or w.contact[CONTACT * which + BOUNCE] >= 1:
+    if n + 1 < MOST_BOUNCES or w.contact[row_of(which) + BOUNCE] >= 1:
         strike(w, i, -v[width * i], -v[width * i + 1], 0, w.since[i])
     return True

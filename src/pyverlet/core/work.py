@@ -15,7 +15,7 @@ from cython.cimports.lanes import real
 from pyverlet.core.cells import BLOCK
 from pyverlet.core.kernels import inlined, kernel
 from pyverlet.core.step import Step
-from pyverlet.core.surface_rows import CONTACT, DRAG, NORMAL, ROLL, SIDES, SPEED, SPIN
+from pyverlet.core.surface_rows import DRAG, NORMAL, NORMAL_Y, ROLL, SIDES, SPEED, SPEED_Y, SPIN, row_of
 
 WORK = cython.declare(cython.int, 6)  # columns per particle, J
 BY_IMPACTS = cython.declare(cython.int, 0)  # normal, by impacts
@@ -146,7 +146,7 @@ def add_belt_work(
     w: cython.pointer(Step), i: cython.Py_ssize_t, k: cython.Py_ssize_t, jt: cython.double, nx: cython.double, ny: cython.double
 ) -> cython.void:
     """Book the impulse jt of surface contact k on particle i along (ny, -nx) as far as the surface moves: it is not friction."""
-    along: cython.double = w.contact[CONTACT * k + SPEED] * ny - w.contact[CONTACT * k + SPEED + 1] * nx
+    along: cython.double = w.contact[row_of(k) + SPEED] * ny - w.contact[row_of(k) + SPEED_Y] * nx
     if along != 0 and w.inverse_mass[i] > 0:
         w.work[WORK * i + BY_FRICTION] -= jt * along / w.inverse_mass[i]
         if 0 <= w.surface[k] < SIDES:
@@ -163,10 +163,10 @@ def add_grip_work(what: cython.p_void, block: cython.int) -> cython.void:
     for n in range(block * BLOCK, block * BLOCK + w.at_surface_count[block]):
         i: cython.Py_ssize_t = w.at_surface[n]
         for k in range(w.contact_begin[i], w.contact_end[i]):
-            first: cython.Py_ssize_t = CONTACT * k
+            first: cython.Py_ssize_t = row_of(k)
             if row[first + DRAG] != 0 and w.inverse_mass[i] > 0:
                 nx: cython.double = row[first + NORMAL]
-                ny: cython.double = row[first + NORMAL + 1]
+                ny: cython.double = row[first + NORMAL_Y]
                 jt: cython.double = row[first + DRAG]
                 ux: cython.double = w.free[2 * i]
                 uy: cython.double = w.free[2 * i + 1]
