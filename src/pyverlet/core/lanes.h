@@ -244,3 +244,12 @@ LANES_INLINE void put(real *array, const uint32_t *index, int64_t k, lanes x, la
 #endif
     }
 }
+
+/* Two or four numbers each of the particles k to k + 7. */
+static const uint32_t consecutive[LANES] = {0, 1, 2, 3, 4, 5, 6, 7};
+LANES_INLINE lanes2 load2(const real *array, int64_t k) { return take(array + 2 * k, consecutive, 0); }
+LANES_INLINE void store2(real *array, int64_t k, lanes x, lanes y) { put(array + 2 * k, consecutive, 0, x, y); }
+LANES_INLINE lanes4 load4(const real *array, int64_t k) { return take4(array + 4 * k, consecutive, 0); }
+LANES_INLINE void store4(real *array, int64_t k, lanes x, lanes y, lanes z, lanes w) {
+    put4(array + 4 * k, consecutive, 0, x, y, z, w);
+}

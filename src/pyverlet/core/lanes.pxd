@@ -41,3 +41,7 @@ cdef extern from "lanes.h" nogil:
     void put(real *array, const uint32_t *index, int64_t k, lanes x, lanes y)
     lanes4 take4(const real *array, const uint32_t *index, int64_t k)
     void put4(real *array, const uint32_t *index, int64_t k, lanes x, lanes y, lanes z, lanes w)
+    lanes2 load2(const real *array, int64_t k)
+    void store2(real *array, int64_t k, lanes x, lanes y)
+    lanes4 load4(const real *array, int64_t k)
+    void store4(real *array, int64_t k, lanes x, lanes y, lanes z, lanes w)

@@ -4,7 +4,27 @@
 from __future__ import annotations
 
 import cython
-from cython.cimports.lanes import above, any_lane, lanes, larger, largest_lane, load, outside, real, spread, store, sum_of_pairs
+from cython.cimports.lanes import (
+    above,
+    any_lane,
+    lanes,
+    lanes2,
+    lanes4,
+    larger,
+    largest_lane,
+    load,
+    load2,
+    load4,
+    magnitude,
+    outside,
+    real,
+    smaller,
+    spread,
+    store,
+    store2,
+    store4,
+    sum_of_pairs,
+)
 
 from pyverlet.core.cells import BLOCK
 from pyverlet.core.kernels import inlined, kernel
@@ -30,8 +50,24 @@ def kick(shared: cython.pointer(Step), a: cython.Py_ssize_t, b: cython.Py_ssize_
     kicked: real = w.opening if begins else w.h
     back: real = w.already_given if begins else cython.cast(real, 0)
     most: real = 0
+    fastest: lanes = spread(0)
+    whole: cython.Py_ssize_t
+    i: cython.Py_ssize_t
     if w.rough:
-        for i in range(a, b):
+        whole = b - b % 8
+        for i in range(a, whole, 8):
+            m: lanes4 = load4(w.motion, i)
+            force: lanes2 = load2(w.acceleration, i)
+            given: lanes2 = load2(w.given, i)
+            vx: lanes = m.x + force.x * spread(kicked) - given.x * spread(back)
+            vy: lanes = m.y + force.y * spread(kicked) - given.y * spread(back)
+            spin: lanes = m.z - load(w.given_spin, i) * spread(back)
+            store4(w.motion, i, vx, vy, spin, m.w)
+            store2(w.free, i, vx, vy)
+            store(w.free_spin, i, spin)
+            fastest = larger(vx * vx + vy * vy, fastest)
+        most = largest_lane(fastest)
+        for i in range(whole, b):
             x: real = w.motion[4 * i] + w.acceleration[2 * i] * kicked - w.given[2 * i] * back
             y: real = w.motion[4 * i + 1] + w.acceleration[2 * i + 1] * kicked - w.given[2 * i + 1] * back
             s: real = w.motion[4 * i + 2] - w.given_spin[i] * back
@@ -40,8 +76,7 @@ def kick(shared: cython.pointer(Step), a: cython.Py_ssize_t, b: cython.Py_ssize_
             square: real = x * x + y * y
             most = square if square > most else most
     else:
-        fastest: lanes = spread(0)
-        whole: cython.Py_ssize_t = 2 * b - 2 * b % 8
+        whole = 2 * b - 2 * b % 8
         for i in range(2 * a, whole, 8):
             u: lanes = load(w.velocity, i) + load(w.acceleration, i) * spread(kicked) - load(w.given, i) * spread(back)
             store(w.velocity, i, u)
@@ -69,8 +104,21 @@ def drift(w: cython.pointer(Step), a: cython.Py_ssize_t, b: cython.Py_ssize_t, p
     o: cython.pointer(Step) = cython.address(own)
     h: real = o.h
     stale: cython.bint = False
-    whole: cython.Py_ssize_t = a if o.rough else b - b % 4
-    for i in range(2 * a, 2 * whole, 8):
+    whole: cython.Py_ssize_t = b - b % (8 if o.rough else 4)
+    i: cython.Py_ssize_t
+    for i in range(a, whole if o.rough else a, 8):
+        m: lanes4 = load4(o.motion, i)
+        p: lanes2 = load2(o.position, i)
+        q: lanes2 = load2(o.checked, i)
+        far_x: lanes = m.x * spread(h)
+        far_y: lanes = m.y * spread(h)
+        px: lanes = p.x + far_x
+        py: lanes = p.y + far_y
+        store2(o.position, i, px, py)
+        far_x = far_x + (px - q.x)
+        far_y = far_y + (py - q.y)
+        stale |= any_lane(outside(above(spread(o.allowed), far_x * far_x + far_y * far_y)))
+    for i in range(2 * a, 2 * a if o.rough else 2 * whole, 8):
         step: lanes = load(o.velocity, i) * spread(h)
         there: lanes = load(o.position, i) + step
         store(o.position, i, there)
@@ -96,8 +144,17 @@ def remember(w: cython.pointer(Step), a: cython.Py_ssize_t, b: cython.Py_ssize_t
 
     Jumps of the spin are limited to twice the previous value.
     """
+    i: cython.Py_ssize_t
     if w.rough:
-        for i in range(a, b):
+        whole: cython.Py_ssize_t = b - b % 8
+        for i in range(a, whole, 8):
+            m: lanes4 = load4(w.motion, i)
+            u: lanes2 = load2(w.free, i)
+            last: lanes = magnitude(load(w.given_spin, i))
+            limit: lanes = last + last + spread(w.rest_speed) / load(w.radius, i)
+            store2(w.given, i, m.x - u.x, m.y - u.y)
+            store(w.given_spin, i, larger(-limit, smaller(limit, m.z - load(w.free_spin, i))))
+        for i in range(whole, b):
             turned: real = w.motion[4 * i + 2] - w.free_spin[i]
             before: real = w.given_spin[i] if w.given_spin[i] > 0 else -w.given_spin[i]
             most: real = before + before + w.rest_speed / w.radius[i]

@@ -106,6 +106,10 @@ def _lanes(real: Any) -> dict[str, Any]:
         "take": take,
         "put": put,
         "take4": take4,
+        "load2": lambda array, k: take(array[2 * k :], np.arange(_LANES), 0),
+        "load4": lambda array, k: take4(array[4 * k :], np.arange(_LANES), 0),
+        "store2": lambda array, k, *values: put(array[2 * k :], np.arange(_LANES), 0, *values),
+        "store4": lambda array, k, *values: put(array[4 * k :], np.arange(_LANES), 0, *values),
         "put4": put,
     }
 
