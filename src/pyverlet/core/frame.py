@@ -38,8 +38,8 @@ from pyverlet.core.sensors import sense
 from pyverlet.core.shared_impacts import begin_impacts, share_impacts
 from pyverlet.core.spans import INTEGRATE, LINKS, NOTES, PAIRS, SURFACES
 from pyverlet.core.step import NEAR, OPEN, Step
-from pyverlet.core.surface_batches import TASK_HOLD, TASK_RELAX, solve_surfaces
-from pyverlet.core.surface_contacts import forget_jam, warm_surfaces
+from pyverlet.core.surface_batches import TASK_HOLD, TASK_RELAX, TASK_WARM, solve_surfaces
+from pyverlet.core.surface_contacts import forget_jam
 from pyverlet.core.surface_sides import keep_in_sight, keep_inside, keep_sides
 from pyverlet.core.warm_start import warm_start
 from pyverlet.core.work import add_drift_work, add_end_work, add_friction_work, add_grip_work, add_start_work
@@ -64,11 +64,7 @@ MOST_ROUNDS = cython.declare(cython.int, 100)  # over the groups with impacts
 def warm_surfaces_stage(what: cython.p_void, item: cython.int) -> cython.void:
     """Warm start: repeat the impulses of surfaces on particles of a block."""
     w: cython.pointer(Step) = cython.cast(cython.pointer(Step), what)
-    block: cython.Py_ssize_t = w.awake[item]
-    n: cython.Py_ssize_t
-    for n in range(block * BLOCK, block * BLOCK + w.at_surface_count[block]):
-        i: cython.Py_ssize_t = w.at_surface[n]
-        warm_surfaces(w, i)
+    solve_surfaces(w, w.awake[item], TASK_WARM)
 
 
 @kernel

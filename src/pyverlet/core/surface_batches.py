@@ -15,7 +15,17 @@ from pyverlet.core.cells import BLOCK
 from pyverlet.core.event_recording import record_held
 from pyverlet.core.kernels import inlined, kernel
 from pyverlet.core.step import Step
-from pyverlet.core.surface_contacts import SETTLED, SMALL_ANGLE, bend_change, bend_excess, dragged, hold_surfaces, relax_surfaces
+from pyverlet.core.surface_contacts import (
+    SETTLED,
+    SMALL_ANGLE,
+    bend_change,
+    bend_excess,
+    dragged,
+    hold_surfaces,
+    relax_surfaces,
+    stands,
+    warm_surfaces,
+)
 from pyverlet.core.surface_rows import (
     BEND,
     COULOMB,
@@ -25,6 +35,8 @@ from pyverlet.core.surface_rows import (
     NORMAL_Y,
     PUSH,
     RUNS,
+    SEEN,
+    SEEN_Y,
     SPEED,
     SPEED_Y,
     clear_of,
@@ -33,9 +45,10 @@ from pyverlet.core.surface_rows import (
 from pyverlet.core.surface_shapes import measure_surface
 from pyverlet.core.surfaces import MOST_FASTER, bounce_surfaces, has_rebounds, keeps_clear
 
-TASK_HOLD = cython.declare(cython.int, 0)
-TASK_RELAX = cython.declare(cython.int, 1)
-TASK_RELAX_AGAIN = cython.declare(cython.int, 2)
+TASK_WARM = cython.declare(cython.int, 0)
+TASK_HOLD = cython.declare(cython.int, 1)
+TASK_RELAX = cython.declare(cython.int, 2)
+TASK_RELAX_AGAIN = cython.declare(cython.int, 3)
 """Passes over particles at surfaces. The last one: surfaces other than pinned circles were measured by the one before."""
 
 
@@ -172,6 +185,54 @@ def solve_rest(
 
 
 @inlined
+def warm_rest(w: cython.pointer(Step), k: cython.Py_ssize_t, r: cython.pointer(Rest), rough: cython.bint) -> cython.void:
+    """Repeat the impulses of contacts k to k + 7; `room` is how far particles have moved since these were measured."""
+    row: cython.p_double = w.contact
+    at: cython.Py_ssize_t = row_of(k)
+    n: cython.int
+    radius: real[8]
+    ease: real[8]
+    px: real[8]
+    py: real[8]
+    position: lanes2 = take(w.position, w.contact_particle, k)
+    store(px, 0, position.x)
+    store(py, 0, position.y)
+    if rough:
+        store(radius, 0, gather(w.radius, w.contact_particle, k))
+        store(ease, 0, gather(w.ease, w.contact_particle, k) if w.mixed else spread(w.ease[0]))
+    for n in range(8):
+        push: cython.double = row[at + PUSH + n]
+        tangent: cython.double = row[at + DRAG + n] if rough else 0.0
+        r.room[n] = fabs(px[n] - row[at + SEEN + n]) + fabs(py[n] - row[at + SEEN_Y + n])
+        r.push[n] = push
+        r.vx[n] += cython.cast(real, tangent * row[at + NORMAL_Y + n] - push * row[at + NORMAL + n])
+        r.vy[n] -= cython.cast(real, tangent * row[at + NORMAL + n] + push * row[at + NORMAL_Y + n])
+        if rough:
+            r.drag[n] = tangent
+            r.spin[n] -= cython.cast(real, tangent * (ease[n] / cython.cast(cython.double, radius[n])))
+
+
+@inlined
+def warm_eight(
+    w: cython.pointer(Step), k: cython.Py_ssize_t, r: cython.pointer(Rest), rough: cython.bint, last: cython.Py_ssize_t
+) -> cython.Py_ssize_t:  # fmt: skip
+    """Warm-start the particles of contacts k to k + 7, except `last`; returns the last one that was by itself."""
+    n: cython.int
+    load_motion(w, k, r, rough)
+    warm_rest(w, k, r, rough)
+    for n in range(8):
+        i: cython.Py_ssize_t = w.contact_particle[k + n]
+        if not r.push[n] > 0 or i == last:
+            continue
+        if r.room[n] == 0 and carries_alone(w, i, k + n):
+            store_rest(w, k, n, r, rough)
+        else:
+            warm_surfaces(w, i)
+            last = i
+    return last
+
+
+@inlined
 def hold_eight(
     w: cython.pointer(Step), block: cython.Py_ssize_t, k: cython.Py_ssize_t, r: cython.pointer(Rest), rough: cython.bint,
     last: cython.Py_ssize_t,
@@ -243,7 +304,9 @@ def solve_eights(w: cython.pointer(Step), block: cython.Py_ssize_t, task: cython
     last: cython.Py_ssize_t = -1
     k: cython.Py_ssize_t
     for k in range(w.contact_begin[first], w.contact_end[final], 8):
-        if task == TASK_HOLD:
+        if task == TASK_WARM:
+            last = warm_eight(w, k, r, rough, last)
+        elif task == TASK_HOLD:
             last = hold_eight(w, block, k, r, rough, last)
         else:
             last = relax_eight(w, k, r, rough, task == TASK_RELAX_AGAIN, last)
@@ -268,11 +331,14 @@ def hold_particle(w: cython.pointer(Step), block: cython.Py_ssize_t, i: cython.P
 
 @kernel
 def solve_surfaces(w: cython.pointer(Step), block: cython.Py_ssize_t, task: cython.int) -> cython.void:
-    """Hold or relax the particles of a block that may touch surfaces; fast ones bounce before they are held."""
+    """Warm-start, hold or relax the particles of a block that may touch surfaces; fast ones bounce before they are held."""
     n: cython.Py_ssize_t
-    if w.linked or w.restless or w.rolls or w.records_contacts or w.records_events:
+    by_one: cython.bint = w.linked or w.restless or w.rolls or w.records_contacts or w.records_events
+    if by_one or (task == TASK_WARM and not stands(w)):
         for n in range(block * BLOCK, block * BLOCK + w.at_surface_count[block]):
-            if task == TASK_HOLD:
+            if task == TASK_WARM:
+                warm_surfaces(w, w.at_surface[n])
+            elif task == TASK_HOLD:
                 hold_particle(w, block, w.at_surface[n])
             else:
                 relax_surfaces(w, w.at_surface[n], task == TASK_RELAX_AGAIN)

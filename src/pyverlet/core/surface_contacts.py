@@ -396,18 +396,23 @@ def relax_surfaces(w: cython.pointer(Step), i: cython.Py_ssize_t, again: cython.
             hold(w, i, k, True, 0, w.rough)
 
 
+@inlined
+def stands(w: cython.pointer(Step)) -> cython.bint:
+    """Whether loaded contacts with surfaces other than pinned circles were measured at the end of the last substep."""
+    return w.substep > w.first and w.relaxes > 0 and w.moving_count == 0 and not (w.one_way or w.linked)
+
+
 @kernel
 def warm_surfaces(w: cython.pointer(Step), i: cython.Py_ssize_t) -> cython.void:
     """Warm start: repeat the impulses of surfaces on particle i along current normals."""
     k: cython.Py_ssize_t
-    # Fixed surfaces were measured at the end of the last substep.
-    stands: cython.bint = w.substep > w.first and w.relaxes > 0 and w.moving_count == 0 and not (w.one_way or w.linked)
+    known: cython.bint = stands(w)
     if w.one_way:
         find_sides(w, i)
     for k in range(w.contact_begin[i], w.contact_end[i]):
         first: cython.Py_ssize_t = row_of(k)
         if w.contact[first + PUSH] > 0:
-            if not stands or w.surface[k] < 0 or way_from(w, i, w.contact, first + SEEN) > 0:
+            if not known or w.surface[k] < 0 or way_from(w, i, w.contact, first + SEEN) > 0:
                 measure_surface(w, i, k, False)
             if w.substep == w.first:
                 w.contact[first + PUSH] *= w.scale
