@@ -245,12 +245,12 @@ def hold_eight(
         i: cython.Py_ssize_t = w.contact_particle[k + n]
         if i == last:
             continue
-        calm: cython.bint = r.room[n] > 0 and w.thrown[i] == 0
+        clear: cython.bint = r.room[n] > 0 and w.thrown[i] == 0
         if w.contact[row_of(k) + PUSH + n] > 0:
-            if calm and w.since[i] == 0 and r.spare[n] > 0 and carries_alone(w, i, k + n):
+            if clear and w.since[i] == 0 and r.spare[n] > 0 and carries_alone(w, i, k + n):
                 store_rest(w, k, n, r, rough)
                 continue
-        elif calm or w.contact_begin[i] != k + n:
+        elif clear or w.contact_begin[i] != k + n:
             continue
         hold_particle(w, block, i)
         last = i
