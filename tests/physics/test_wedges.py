@@ -11,7 +11,7 @@ from tests.worlds import each_frame, points
 import pyverlet as pv
 
 PUSH, DRAG, ROLL = 8, 9, 10
-"""As in `core/surface_rows.py`."""
+"""Columns, as in `core/surface_rows.py`."""
 
 
 @pytest.mark.parametrize("restitution", [0.0, 0.5, 1.0])
@@ -59,7 +59,7 @@ def test_what_lets_go_of_a_wedge_takes_back_its_friction_and_its_roll(friction: 
     for _ in each_frame(world, 60):
         arrays = world._frames.held.engine.arrays
         for side in "01":
-            push, drag, roll = arrays[f"contact{side}"][:, [PUSH, DRAG, ROLL]].T
+            push, drag, roll = (arrays[f"contact{side}"][:, column] for column in (PUSH, DRAG, ROLL))
             assert (np.abs(drag) <= friction * push * (1 + 1e-9)).all()
             assert (np.abs(roll) <= 0.3 * 0.05 * push * (1 + 1e-9)).all()
             most = max(most, float(push.max(initial=0.0)))

@@ -5,12 +5,13 @@ from __future__ import annotations
 
 import cython
 from cython.cimports.lanes import real
-from cython.cimports.libc.stdint import uint32_t
+from cython.cimports.libc.stdint import int64_t, uint32_t
 from cython.cimports.team import team_clock, team_run, team_spent
 
 from pyverlet.core.contact_recording import begin_records
 from pyverlet.core.frame_ends import all_finite
 from pyverlet.core.kernels import inlined, kernel
+from pyverlet.core.rest_timers import longer_at_rest
 from pyverlet.core.rows import MovingRows, put_rows, take_rows
 from pyverlet.core.running import run_substeps
 from pyverlet.core.spans import INTEGRATE, LISTS, NOTES, OTHER
@@ -29,7 +30,7 @@ OTHERS = cython.declare(cython.int, 1)
 SHORT = cython.declare(cython.int, 2)
 """Arrays are too small for a list: enlarge them and continue the frame."""
 DOUBTFUL = cython.declare(cython.int, 3)
-"""Substeps are done, but a number may not be finite, or there is too much energy: Python ends the frame."""
+"""Substeps are done, but a number may not be finite, there is too much energy, or particles may sleep: Python ends the frame."""
 
 RELEASED_FROM = cython.declare(cython.Py_ssize_t, 256)
 """Particles from which on the GIL is released: smaller frames end before another thread could begin."""
@@ -67,6 +68,13 @@ Plain = cython.struct(
     limited=cython.bint,
     precise=real,  # m: at larger coordinates resting particles may tremble
     far=cython.bint,  # whether any particle is beyond
+    asleep=cython.bint,  # whether nothing moves: all particles are pinned or asleep
+    timers=cython.p_float,  # (count,) s at rest
+    free=cython.pointer[cython.const[int64_t]],  # (timed,) rows of particles with a timer; none unless particles may sleep
+    timed=cython.Py_ssize_t,
+    rest=cython.double,  # see `core.rest_timers`
+    dt=cython.double,
+    after=cython.double,  # s at rest after which a particle may fall asleep
     left=cython.int,  # frames still to be made
     made=cython.int,  # frames not yet reported to the world
     status=cython.int,
@@ -125,6 +133,35 @@ def was_set(p: cython.pointer(Plain)) -> cython.bint:
 
 
 @kernel
+def was_moved(p: cython.pointer(Plain)) -> cython.bint:
+    """Whether the user has set a position, velocity or spin."""
+    m: cython.pointer(MovingRows) = p.taken
+    moved: cython.bint = False
+    for k in range(m.count):
+        i: cython.Py_ssize_t = m.order[k]
+        moved |= m.x[2 * k] != m.x_from[2 * i] or m.x[2 * k + 1] != m.x_from[2 * i + 1]
+        moved |= m.v[2 * k] != m.v_from[2 * i] or m.v[2 * k + 1] != m.v_from[2 * i + 1] or m.s[k] != m.s_from[i]
+    return moved
+
+
+@kernel
+def stays_awake(p: cython.pointer(Plain)) -> cython.bint:
+    """Add a frame to the timers of particles at rest. False, and nothing is changed, if any may fall asleep."""
+    w: cython.pointer(Step) = p.w
+    for store in range(2):
+        for k in range(p.timed):
+            i: cython.Py_ssize_t = p.free[k]
+            longer: cython.float = longer_at_rest(
+                w.velocity, w.spin, w.radius, i, cython.cast(real, p.rest), cython.cast(cython.float, p.dt), p.timers[i]
+            )
+            if store:
+                p.timers[i] = longer
+            elif longer >= cython.cast(cython.float, p.after):
+                return False
+    return True
+
+
+@kernel
 def begin_plain(p: cython.pointer(Plain)) -> cython.void:
     """Gather, and save what a refused frame goes back to."""
     w: cython.pointer(Step) = p.w
@@ -167,15 +204,22 @@ def end_plain(p: cython.pointer(Plain)) -> cython.int:
             w.position, w.velocity, w.velocity, 0.0, w.spin, w.radius, p.sorted_mass, p.gx, p.gy, 0, w.count
         )
         good = not (now - p.energy > p.most * (PLACED if p.placed else 1))
+    good = good and stays_awake(p)
     charge(p, FINISH)
     if not good:
         return DOUBTFUL
     put_rows(p.put, 0)
-    p.far = False
-    for k in range(2 * w.count):
-        p.far |= w.position[k] > p.precise or w.position[k] < -p.precise
+    find_far(p)
     end_times(p)
     return MADE
+
+
+@kernel
+def find_far(p: cython.pointer(Plain)) -> cython.void:
+    """Determine whether any particle is far from the origin."""
+    p.far = False
+    for k in range(2 * p.w.count):
+        p.far |= p.w.position[k] > p.precise or p.w.position[k] < -p.precise
 
 
 @kernel
@@ -199,9 +243,12 @@ def run_plain(p: cython.pointer(Plain)) -> cython.void:
             p.since = team_clock()
             for k in range(FRAMES + 1):
                 p.last[k] = 0
-            if was_set(p):
+            if was_set(p) or (p.asleep and was_moved(p)):
                 p.status = OTHERS
                 return
+            if p.asleep:
+                end_times(p)
+                continue
             begin_plain(p)
         team_run(p.w.team, run_substeps, p.w, 1)
         p.status = SHORT if p.w.lists.short else end_plain(p)

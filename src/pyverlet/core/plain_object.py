@@ -10,6 +10,7 @@ import cython
 import numpy as np
 from cython.cimports.arrays import (
     const_indices_in,
+    const_integers,
     const_octets,
     const_reals,
     const_reals_in,
@@ -18,11 +19,12 @@ from cython.cimports.arrays import (
     indices,
     octets,
     reals,
+    singles,
 )
 from cython.cimports.libc.math import INFINITY
 
 from pyverlet.core.engine_object import Engine
-from pyverlet.core.plain_frames import DOUBTFUL, MADE, OTHERS, RELEASED_FROM, SHORT, Plain, end_times, run_plain
+from pyverlet.core.plain_frames import DOUBTFUL, MADE, OTHERS, RELEASED_FROM, SHORT, Plain, end_times, find_far, run_plain
 from pyverlet.core.rows import MovingRows, map_motion
 
 
@@ -39,14 +41,15 @@ class PlainFrames:
         angle: (n,) in the user's order.
         slot_mass: (n,) kg.
         numbers, marks: the user's columns, which must stay unchanged.
-        law: (6,) seconds and substeps of a frame, gravity, J that a frame may gain, infinite for no limit, and m from the
-            origin up to which coordinates are precise enough for particles at rest.
+        law: (8,) seconds and substeps of a frame, gravity, J that a frame may gain, infinite for no limit, m from the origin
+            up to which coordinates are precise enough for particles at rest, and the limit and time of `core.resting`.
         same: (object, name, value): attributes that must stay unchanged; of the world if the object is None.
         checked, changes: such attributes, which change only when `changes.latest` does; see `common.checked`.
         obstacles: such attributes, which change with obstacles; see `world.plain.follow`.
         empty: lists that must stay empty.
         end: called with the world and this object to end a frame that is in doubt, while `pending`.
         times: (2, FRAMES + 1), written here; see there.
+        asleep: whether nothing moves. timers, free: (n,) s and rows, as in `core.resting`; no rows if none sleeps.
 
     Attributes:
         given: (n, 3) contact impulses before the last frame, m/s and rad/s.
@@ -77,7 +80,7 @@ class PlainFrames:
 
     def __init__(
         self, engine: Engine, lock, rows, placed, state, order, angle, sorted_mass, numbers, marks, law, same, checked,
-        changes, obstacles, empty, end, times,
+        changes, obstacles, empty, end, times, asleep, timers, free,
     ):  # fmt: skip
         p: cython.pointer(Plain) = cython.address(self.p)
         count: cython.Py_ssize_t = len(order)
@@ -96,7 +99,7 @@ class PlainFrames:
         map_motion(p.put, state, rows, order)
         self.taken.placed, none = octets(placed), np.zeros(1, np.uint8)
         known, marked, self.given = np.array(numbers), np.array(marks), np.zeros((count, 3), sorted_mass.dtype)
-        self.arrays = (rows, placed, state, order, angle, sorted_mass, numbers, marks, times, none, known, marked)
+        self.arrays = (timers, free, rows, placed, state, order, angle, sorted_mass, numbers, marks, times, none, known, marked)
         p.put.turned, p.put.half_dt, p.put.skips = doubles(angle), 0.5 * self.dt, False
         p.put.still, p.put.written = const_octets(none), octets(none)
         p.sorted_mass = const_reals(sorted_mass)
@@ -106,6 +109,10 @@ class PlainFrames:
         p.material, p.fixed_rotation = const_indices_in(marks, 2), const_indices_in(marks, 3)
         p.known, p.marks, p.given = reals(known), indices(marked), reals(self.given)
         p.last, p.total = doubles_in(times, 0), doubles_in(times, 1)
+        p.asleep, p.dt, p.rest, p.after, p.far, p.timed = asleep, self.dt, value[6], value[7], False, len(free)
+        p.timers, p.free = singles(timers), const_integers(free)
+        if asleep:
+            find_far(p)
 
     def step(self, world, dt) -> bool:
         """Make a frame of dt seconds if it is plain; returns whether it was."""

@@ -10,6 +10,7 @@ from cython.cimports.lanes import real
 from cython.cimports.libc.stdint import int64_t, uint8_t
 
 from pyverlet.core.islands import find_root, join_listed
+from pyverlet.core.rest_timers import longer_at_rest
 
 
 def time_at_rest(velocity, spin, radius, free, limit: real, dt: cython.float, after: cython.float, sleep_timer) -> bool:
@@ -23,17 +24,12 @@ def time_at_rest(velocity, spin, radius, free, limit: real, dt: cython.float, af
     sorted_index: cython.pointer[cython.const[int64_t]] = const_integers(free)
     timer: cython.p_float = singles(sleep_timer)
     count: cython.Py_ssize_t = len(free)
-    zero: cython.float = 0
     found: cython.int = 0
     with cython.nogil:
         for k in range(count):
             i: cython.Py_ssize_t = sorted_index[k]
-            rim: real = w[i] * r[i]
-            speed2: real = v[2 * i] * v[2 * i] + v[2 * i + 1] * v[2 * i + 1] + rim * rim
-            longer: cython.float = timer[i] + dt
-            longer = longer if speed2 <= limit * r[i] else zero
-            timer[i] = longer
-            found |= longer >= after
+            timer[i] = longer_at_rest(v, w, r, i, limit, dt, timer[i])
+            found |= timer[i] >= after
     return found != 0
 
 

@@ -15,17 +15,8 @@ from pyverlet.core.cells import BLOCK
 from pyverlet.core.event_recording import record_held
 from pyverlet.core.kernels import inlined, kernel
 from pyverlet.core.step import Step
-from pyverlet.core.surface_contacts import (
-    SETTLED,
-    SMALL_ANGLE,
-    bend_change,
-    bend_excess,
-    dragged,
-    hold_surfaces,
-    relax_surfaces,
-    stands,
-    warm_surfaces,
-)
+from pyverlet.core.surface_contacts import hold_surfaces, relax_surfaces, stands, warm_surfaces
+from pyverlet.core.surface_formulas import SETTLED, SMALL_ANGLE, bend_change, bend_excess, dragged
 from pyverlet.core.surface_rows import (
     BEND,
     COULOMB,

@@ -80,6 +80,10 @@ class Sleep:
         """Whether nothing can move."""
         return self.anyone and not len(sorted_state.free)
 
+    def is_plain(self, sorted_state: SortedState) -> bool:
+        """Whether the core can make frames by itself: all sleep and no pinned particle moves, or all are awake and may sleep."""
+        return self._laws is not None and (not self.anyone or (self._stands and self.all_asleep(sorted_state)))
+
     def wake(self, sorted_state: SortedState, touched: Array) -> bool:
         """Wake islands with a touched particle: (n,) 1. Returns whether there were any: then the list lacks pairs."""
         return self._wake(

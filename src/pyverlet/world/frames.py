@@ -44,9 +44,7 @@ class Frames:
     def __init__(self, dtype: np.dtype[Any]) -> None:
         self._dtype = dtype
         self.held = CoreArrays(dtype)
-        self._flight = FreeSteps()
-        self.links = CoreLinks()
-        self._time_step_check = TimeStepCheck()
+        self._flight, self.links, self._time_step_check = FreeSteps(), CoreLinks(), TimeStepCheck()
         self._law: Any = None  # the last arguments of `engine.set_law`
         self.repeats = False  # whether the next frame would pass the engine the same arguments
         self._pull: tuple[Any, float] = None, 0.0  # gravity and its magnitude, m/s^2
@@ -99,8 +97,8 @@ class Frames:
                 if not good:
                     self.held.engine.record_contacts(False)
 
-    def end_plain(self, world: Any, plain: Any) -> None:
-        """End a frame whose substeps the core has made by itself (a plain frame).
+    def end_plain(self, world: Any, plain: Any) -> bool:
+        """End a frame whose substeps the core has made by itself (a plain frame). Returns whether particles fell asleep.
 
         Raises:
             NonFiniteError: a particle turned NaN or infinite.
@@ -115,6 +113,15 @@ class Frames:
                     self.held.engine.record_contacts(False)
             if plain.limited:
                 self._limit(world, None, plain.dt)
+            return self._let_sleep(world, plain.dt, world.gravity)
+
+    def _let_sleep(self, world: Any, dt: float, gravity: tuple[float, float]) -> bool:
+        """At the end of a frame of dt seconds: put particles to sleep that may; returns whether there were any."""
+        state, start = world._sorted, world._state.shown["position"]
+        asleep = bool(world._sleep and world._sleep.end(state, start, self.listed(), dt, float(np.hypot(*gravity))))
+        if asleep:
+            self.held.set_aside(state)
+        return asleep
 
     def run(self, world: Any, dt: float, on_stage_end: Callable[[str], None]) -> bool:
         """Advance the gathered rows by a frame of dt seconds. False if a particle turned NaN or infinite."""
@@ -235,9 +242,7 @@ class Frames:
             world._events.record(recorded_events(engine, world._obstacle_arrays))
             world._events.sense(world._obstacle_arrays, *sensed_by(engine, world))
             engine.record_events(None)
-        strength, shown = float(np.hypot(*frame.gravity)), world._state.shown
-        if world._sleep and world._sleep.end(state, shown["position"], self.listed(), dt, strength):
-            held.set_aside(state)
+        self._let_sleep(world, dt, frame.gravity)
         frame.on_stage_end("finish")
         if state.periodic:
             engine.wrap_positions(state.crossed)

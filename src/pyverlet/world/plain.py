@@ -8,6 +8,7 @@ import numpy as np
 
 from pyverlet import core
 from pyverlet.common.checked import Checked, changes
+from pyverlet.common.constants import SLEEP_AFTER_S, SLEEP_SPEED
 from pyverlet.common.errors import PyverletError
 from pyverlet.common.interrupts import without_interrupts
 from pyverlet.common.step_lock import exclusive
@@ -23,6 +24,9 @@ _WORLD = ("actors", "observer", "_contact_records")
 """Attributes that must stay the same; all others have setters or belong to other frames, which end plain frames."""
 
 
+_NOBODY = np.zeros(0, np.int64)
+
+
 def plain_frames(world: Any, dt: float) -> Any:
     """An object that runs frames like the last one, of dt seconds; None if more than motion may change in them."""
     frames, state, sorted_state, obstacles, boundary = (
@@ -32,16 +36,17 @@ def plain_frames(world: Any, dt: float) -> Any:
         world._obstacle_arrays,
         world._boundary,
     )
-    held = frames.held
+    held, sleep = frames.held, world._sleep
+    asleep = sleep is not None and sleep.all_asleep(sorted_state)
+    repeats = frames.repeats and frames.gravity is world.gravity and held.steps == world._substeps
     if not (
-        frames.repeats
-        and frames.gravity is world.gravity
+        (asleep or repeats)
+        and (sleep is None or (sleep.is_plain(sorted_state) and world._contact_records is None))
         and 0 < len(sorted_state) < SORTED_FROM
         and dt <= LONGEST
-        and held.steps == world._substeps
         and type(boundary) in BOUNDARIES
         and not (world.forces or world.links or world.actors or obstacles.moving or sorted_state.periodic or sorted_state.others)
-        and world.observer is world._events is world._sleep is world._energy_ledger is None
+        and world.observer is world._events is world._energy_ledger is None
         and not (sorted_state.own_inertia or held.parting)
         and all(isinstance(value, float | int | str | tuple) for value in vars(boundary).values())
     ):
@@ -50,12 +55,13 @@ def plain_frames(world: Any, dt: float) -> Any:
     checked = [wall for wall in walls if isinstance(getattr(type(boundary), wall[1], None), Checked)]
     limited = (world._collisions and len(sorted_state) > 1) or obstacles.solid
     most = most_gained(world) if limited else np.inf
-    precise = fine_up_to(sorted_state, float(np.hypot(*world.gravity)), sorted_state.h, world._substeps)
+    gravity = float(np.hypot(*world.gravity))
+    precise = fine_up_to(sorted_state, gravity, sorted_state.h, world._substeps)
     return core.unit("engine", state.dtype).PlainFrames(
         held.engine, state.lock, moving(sorted_state), sorted_state.placed, moving(state), sorted_state.particle,
         state.shown["angle"], sorted_state.mass,
         [state.shown[name] for name in SET], [state.shown[name] for name in MARKS],
-        np.array((dt, world._substeps, *world.gravity, most, precise)),
+        np.array((dt, world._substeps, *world.gravity, most, precise, SLEEP_SPEED**2 * gravity, SLEEP_AFTER_S)),
         [
             *((None, name, getattr(world, name)) for name in _WORLD),
             *((of, name, getattr(of, name)) for of, name in ((state, "shown"), (world._force_sum, "gravity"), (held, "parting"))),
@@ -63,6 +69,7 @@ def plain_frames(world: Any, dt: float) -> Any:
         ],
         checked, changes, _of_obstacles(world),
         [world.actors, world.forces, world.links._links], _end, world.profile.plain,
+        asleep, sorted_state.sleep_timer, sorted_state.free if sleep else _NOBODY,
     )  # fmt: skip
 
 
@@ -95,14 +102,15 @@ def _of_obstacles(world: Any) -> list[tuple[Any, str, int]]:
 
 
 def _end(world: Any, plain: Any) -> None:
-    """End a frame in which a number may not be finite, or that may have gained too much energy.
+    """End a frame in which a number may not be finite, that may have gained too much energy, or in which particles fall asleep.
 
     Raises:
         NonFiniteError: a particle turned NaN or infinite; the world still holds the frame before.
     """
     with without_interrupts:
         try:
-            world._frames.end_plain(world, plain)
+            if world._frames.end_plain(world, plain):
+                world._plain = None
             world._sorted.scatter(world._state, plain.dt, world._frames.held.still())
         except PyverletError:
             world._plain = None
