@@ -190,7 +190,7 @@ def count_stage(what: cython.p_void, block: cython.int) -> cython.void:
 def leave_empty(w: cython.pointer(Step), k: cython.Py_ssize_t, i: cython.Py_ssize_t) -> cython.void:
     """Make place k one that carries nothing: eights are computed whole."""
     w.contact_particle[k] = cython.cast(uint32_t, i)
-    w.contact[row_of(k) + PUSH] = 0
+    w.contact[row_of(k) + PUSH] = w.contact[row_of(k) + DRAG] = w.contact[row_of(k) + ROLL] = 0
 
 
 @kernel
