@@ -131,6 +131,56 @@ def test_frames_are_plain_where_obstacles_are_others_in_each(change: str, rough:
     assert found == expected
 
 
+SLEEPERS: dict[str, Callable[[pv.World], Any]] = {
+    "nothing": lambda world: None,
+    "position": lambda world: world.position[3].__iadd__((0, 0.3)),
+    "velocity": lambda world: world.velocity[3].__iadd__((0, 2.0)),
+    "spin": lambda world: world.spin.__setitem__(3, 4.0),
+    "radius": lambda world: world.radius.__setitem__(3, 0.3),
+    "mass": lambda world: world.mass.__setitem__(3, 3.0),
+    "friction": lambda world: world.friction.__setitem__(3, 0.1),
+    "category": lambda world: world.category.__setitem__(3, 2),
+    "pinned": lambda world: world.position[-1].__iadd__((0, 0.1)),
+    "pinned velocity": lambda world: world.velocity.__setitem__(-1, (0, -1)),
+    "gravity": lambda world: setattr(world, "gravity", (1.0, -9.0)),
+    "wall": lambda world: setattr(world.boundary, "friction", 0.1),
+    "size": lambda world: setattr(world.boundary, "upper", (4.5, 40)),
+    "boundary": lambda world: setattr(world, "boundary", pv.Circle(center=(2, 20), radius=30)),
+    "collisions": lambda world: setattr(world, "collisions", pv.Collisions(friction=0.1)),
+    "obstacle": lambda world: world.obstacles.append(pv.Disc((2, 9), 0.2)),
+    "moved obstacle": lambda world: setattr(world.obstacles[0], "pivot", (0.0, -0.03)),
+    "force": lambda world: world.forces.append(pv.Drag(linear=0.1)),
+    "link": lambda world: world.links.append(pv.Stick(world.add(position=[(1, 14), (2, 14)], radius=0.3), 0, 1)),
+    "another": lambda world: world.add(position=(2, 12), radius=0.4),
+    "fewer": lambda world: world.remove(np.array([2, 5])),
+    "step": lambda world: setattr(world, "substeps", 4),
+    "integrator": lambda world: setattr(world, "integrator", pv.VelocityVerlet()),
+    "restored": lambda world: world.restore(world.save()),
+}
+
+
+@pytest.mark.parametrize("count", [12, 40])
+@pytest.mark.parametrize("change", SLEEPERS)
+def test_frames_of_sleepers_are_plain_and_they_wake_as_in_others(change: str, count: int, long_way: Any) -> None:
+    def run() -> tuple[int, list[str]]:
+        world, made, found = heap(count, sleep=True), 0, []
+        world.obstacles.append(pv.Segment((-1, 0.05), (5, 0.05)))
+        world.add(position=(2, 30), mass=np.inf, radius=0.2)
+        for frame in range(420):
+            if frame in (5, 300, 330):  # in flight, when all sleep, and when they have woken or sleep again
+                SLEEPERS[change](world)
+            world.step(DT)
+            made += int(world.profile.plain[0, -1])
+            if frame % 30 == 29:
+                found += [world.state_hash(), str(world.asleep.sum())]
+        return made, found
+
+    (most, found), (none, expected) = run(), long_way(run)
+    assert none == 0
+    assert most > 150 or change in ("force", "link", "pinned velocity", "integrator")
+    assert found == expected
+
+
 def test_an_obstacle_too_far_away_is_refused_in_each_frame_until_it_is_not() -> None:
     world = heap()
     peg = world.obstacles.append(pv.Disc((2, 0.5), 0.3))

@@ -80,6 +80,10 @@ class Sleep:
         """Whether nothing can move."""
         return self.anyone and not len(sorted_state.free)
 
+    def look_again(self, state: State, laws: Any) -> None:
+        """After frames of the core alone, in which nobody slept: the current laws and pinned particles, as `begin` has them."""
+        self._laws, self._pinned = laws, _pinned(state)
+
     def is_plain(self, sorted_state: SortedState) -> bool:
         """Whether the core can make frames by itself: all sleep and no pinned particle moves, or all are awake and may sleep."""
         return self._laws is not None and (not self.anyone or (self._stands and self.all_asleep(sorted_state)))

@@ -15,6 +15,7 @@ from pyverlet.common.step_lock import exclusive
 from pyverlet.laws.gains import most_gained
 from pyverlet.laws.obstacles import journal
 from pyverlet.laws.precision import fine_up_to
+from pyverlet.laws.sleep import laws
 from pyverlet.state.state import MARKS, SET, moving
 from pyverlet.world.core_arrays import SORTED_FROM
 from pyverlet.world.long_frames import LONGEST
@@ -77,11 +78,13 @@ def plain_frames(world: Any, dt: float) -> Any:
 def follow(world: Any, dt: float) -> bool:
     """Whether obstacles have changed since plain frames of dt seconds were prepared; they are then passed to the core.
 
+    Not where particles may sleep: they wake.
+
     Raises:
         InputError: an obstacle is invalid.
     """
     now = _of_obstacles(world)
-    if world._plain is None or dt != world._plain.dt or now == world._plain.obstacles:
+    if world._plain is None or world._sleep or dt != world._plain.dt or now == world._plain.obstacles:
         return False
     before = _made_of(world)
     world._frames.held.follow_obstacles(world, dt)
@@ -109,6 +112,8 @@ def _end(world: Any, plain: Any) -> None:
     """
     with without_interrupts:
         try:
+            if world._sleep:
+                world._sleep.look_again(world._state, laws(world))
             if world._frames.end_plain(world, plain):
                 world._plain = None
             world._sorted.scatter(world._state, plain.dt, world._frames.held.still())
