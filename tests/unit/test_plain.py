@@ -181,6 +181,40 @@ def test_frames_of_sleepers_are_plain_and_they_wake_as_in_others(change: str, co
     assert found == expected
 
 
+@pytest.mark.parametrize("dtype", [np.float32, np.float64])
+@pytest.mark.parametrize("restitution", [0.0, 0.9])
+@pytest.mark.parametrize("change", [*(name for name in SLEEPERS if name not in ("size", "boundary", "fewer")), "awake"])
+def test_frames_are_plain_while_some_sleep_and_they_wake_when_touched(
+    change: str, restitution: float, dtype: Any, long_way: Any
+) -> None:
+    """Circles that fall, roll and bounce beside sleepers, and into them."""
+
+    def run() -> tuple[int, list[str]]:
+        floor = pv.Box((0, 0), (40, 40), friction=0.5, restitution=0.3)
+        world, made, found = heap(12, sleep=True, boundary=floor, dtype=dtype), 0, []
+        world.obstacles.extend([pv.Segment((-1, 0.05), (5, 0.05)), pv.Segment((4.2, 0), (4.2, 3))])
+        world.run(seconds=8, dt=DT)
+        assert world.asleep.all()
+        place = [(8 + 2 * k, 2 + 5 * k) for k in range(6)]
+        world.add(position=place, velocity=[(-1.2 * k, 0) for k in range(6)], radius=0.4, restitution=restitution)
+        world.add(position=(2, 30), mass=np.inf, radius=0.2)
+        for frame in range(600):
+            if frame == 50 and change == "awake":
+                world.position[14] += (0, 1)
+            elif frame == 50:
+                SLEEPERS[change](world)
+            world.step(DT)
+            made += int(world.profile.plain[0, -1]) * bool(0 < world.asleep.sum() < 18)
+            if frame % 30 == 29:
+                found += [world.state_hash(), str(world.asleep.sum())]
+        return made, found
+
+    (most, found), (none, expected) = run(), long_way(run)
+    assert none == 0
+    assert found == expected
+    assert most > 30 or change in ("force", "link", "pinned velocity", "integrator")
+
+
 def test_an_obstacle_too_far_away_is_refused_in_each_frame_until_it_is_not() -> None:
     world = heap()
     peg = world.obstacles.append(pv.Disc((2, 0.5), 0.3))

@@ -30,7 +30,8 @@ OTHERS = cython.declare(cython.int, 1)
 SHORT = cython.declare(cython.int, 2)
 """Arrays are too small for a list: enlarge them and continue the frame."""
 DOUBTFUL = cython.declare(cython.int, 3)
-"""Substeps are done, but a number may not be finite, there is too much energy, or particles may sleep: Python ends the frame."""
+"""Python ends the frame: a number may not be finite, there is too much energy, particles may fall asleep, or a sleeper is touched
+in a coming substep, before which the others have been made."""
 
 RELEASED_FROM = cython.declare(cython.Py_ssize_t, 256)
 """Particles from which on the GIL is released: smaller frames end before another thread could begin."""
@@ -68,6 +69,7 @@ Plain = cython.struct(
     limited=cython.bint,
     precise=real,  # m: at larger coordinates resting particles may tremble
     far=cython.bint,  # whether any particle is beyond
+    sleepers=cython.bint,  # whether anyone sleeps
     asleep=cython.bint,  # whether nothing moves: all particles are pinned or asleep
     timers=cython.p_float,  # (count,) s at rest
     free=cython.pointer[cython.const[int64_t]],  # (timed,) rows of particles with a timer; none unless particles may sleep
@@ -134,10 +136,12 @@ def was_set(p: cython.pointer(Plain)) -> cython.bint:
 
 @kernel
 def was_moved(p: cython.pointer(Plain)) -> cython.bint:
-    """Whether the user has set a position, velocity or spin."""
+    """Whether the user has set a position, velocity or spin of a sleeper or of a pinned particle."""
     m: cython.pointer(MovingRows) = p.taken
     moved: cython.bint = False
     for k in range(m.count):
+        if p.w.inverse_mass[k] > 0:
+            continue
         i: cython.Py_ssize_t = m.order[k]
         moved |= m.x[2 * k] != m.x_from[2 * i] or m.x[2 * k + 1] != m.x_from[2 * i + 1]
         moved |= m.v[2 * k] != m.v_from[2 * i] or m.v[2 * k + 1] != m.v_from[2 * i + 1] or m.s[k] != m.s_from[i]
@@ -198,6 +202,8 @@ def end_plain(p: cython.pointer(Plain)) -> cython.int:
     """After substeps: scatter the results, if they are good."""
     w: cython.pointer(Step) = p.w
     charge_contacts(p)
+    if w.substep < w.substeps:  # an awake particle touches a sleeper
+        return DOUBTFUL
     good: cython.bint = all_finite(w)
     if good and p.limited:
         now: cython.double = block_energy(
@@ -243,7 +249,7 @@ def run_plain(p: cython.pointer(Plain)) -> cython.void:
             p.since = team_clock()
             for k in range(FRAMES + 1):
                 p.last[k] = 0
-            if was_set(p) or (p.asleep and was_moved(p)):
+            if was_set(p) or (p.sleepers and was_moved(p)):
                 p.status = OTHERS
                 return
             if p.asleep:

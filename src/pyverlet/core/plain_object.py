@@ -49,12 +49,14 @@ class PlainFrames:
         empty: lists that must stay empty.
         end: called with the world and this object to end a frame that is in doubt, while `pending`.
         times: (2, FRAMES + 1), written here; see there.
-        asleep: whether nothing moves. timers, free: (n,) s and rows, as in `core.resting`; no rows if none sleeps.
+        sleepers, asleep: whether anyone sleeps, and whether nothing moves.
+        timers, free: (n,) s and rows, as in `core.resting`; no rows if none sleeps.
 
     Attributes:
         given: (n, 3) contact impulses before the last frame, m/s and rad/s.
         limited: whether the energy gain of frames is checked.
         far: whether a particle is beyond that distance from the origin.
+        reached: number of substeps of the last frame that the core has made.
         pending: whether Python must still end a frame.
         used: whether it has made any frames.
     """
@@ -80,7 +82,7 @@ class PlainFrames:
 
     def __init__(
         self, engine: Engine, lock, rows, placed, state, order, angle, sorted_mass, numbers, marks, law, same, checked,
-        changes, obstacles, empty, end, times, asleep, timers, free,
+        changes, obstacles, empty, end, times, sleepers, asleep, timers, free,
     ):  # fmt: skip
         p: cython.pointer(Plain) = cython.address(self.p)
         count: cython.Py_ssize_t = len(order)
@@ -109,7 +111,8 @@ class PlainFrames:
         p.material, p.fixed_rotation = const_indices_in(marks, 2), const_indices_in(marks, 3)
         p.known, p.marks, p.given = reals(known), indices(marked), reals(self.given)
         p.last, p.total = doubles_in(times, 0), doubles_in(times, 1)
-        p.asleep, p.dt, p.rest, p.after, p.far, p.timed = asleep, self.dt, value[6], value[7], False, len(free)
+        p.sleepers, p.asleep, p.far, p.timed = sleepers, asleep, False, len(free)
+        p.dt, p.rest, p.after = self.dt, value[6], value[7]
         p.timers, p.free = singles(timers), const_integers(free)
         if asleep:
             find_far(p)
@@ -128,6 +131,10 @@ class PlainFrames:
     @property
     def far(self) -> bool:
         return self.p.far
+
+    @property
+    def reached(self) -> int:
+        return self.p.w.substep
 
     @cython.cfunc
     def enter(self, world) -> cython.bint:

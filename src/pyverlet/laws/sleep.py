@@ -84,9 +84,10 @@ class Sleep:
         """After frames of the core alone, in which nobody slept: the current laws and pinned particles, as `begin` has them."""
         self._laws, self._pinned = laws, _pinned(state)
 
-    def is_plain(self, sorted_state: SortedState) -> bool:
-        """Whether the core can make frames by itself: all sleep and no pinned particle moves, or all are awake and may sleep."""
-        return self._laws is not None and (not self.anyone or (self._stands and self.all_asleep(sorted_state)))
+    @property
+    def is_plain(self) -> bool:
+        """Whether the core can make frames by itself: particles may sleep, and if any does, no pinned particle moves."""
+        return self._laws is not None and (self._stands or not self.anyone)
 
     def wake(self, sorted_state: SortedState, touched: Array) -> bool:
         """Wake islands with a touched particle: (n,) 1. Returns whether there were any: then the list lacks pairs."""

@@ -89,7 +89,7 @@ class Frames:
                 good = self.run(world, dt, on_stage_end)
                 if not good:
                     try:
-                        self._refuse_non_finite(world, dt)
+                        self.refuse_non_finite(world, dt)
                     finally:
                         self.links.forget()
                         self.held.go_back(before)
@@ -97,25 +97,7 @@ class Frames:
                 if not good:
                     self.held.engine.record_contacts(False)
 
-    def end_plain(self, world: Any, plain: Any) -> bool:
-        """End a frame whose substeps the core has made by itself (a plain frame). Returns whether particles fell asleep.
-
-        Raises:
-            NonFiniteError: a particle turned NaN or infinite.
-        """
-        with np.errstate(over="ignore", invalid="ignore"):
-            if world._sorted.first_non_finite() >= 0:
-                particle, known, _, _, *numbers = self.held.note(world._sorted)
-                try:
-                    self._refuse_non_finite(world, plain.dt)
-                finally:
-                    self.held.go_back((particle, known, plain.given[:, :2], plain.given[:, 2], *numbers))
-                    self.held.engine.record_contacts(False)
-            if plain.limited:
-                self._limit(world, None, plain.dt)
-            return self._let_sleep(world, plain.dt, world.gravity)
-
-    def _let_sleep(self, world: Any, dt: float, gravity: tuple[float, float]) -> bool:
+    def let_sleep(self, world: Any, dt: float, gravity: tuple[float, float]) -> bool:
         """At the end of a frame of dt seconds: put particles to sleep that may; returns whether there were any."""
         state, start = world._sorted, world._state.shown["position"]
         asleep = bool(world._sleep and world._sleep.end(state, start, self.listed(), dt, float(np.hypot(*gravity))))
@@ -132,8 +114,8 @@ class Frames:
         self._open(world, frame)
         on_stage_end("gather")
         self._attend(world, frame)
-        finite = self._substeps(world, frame)
-        return self._close(world, frame, finite=finite)
+        finite = self.substeps(world, frame)
+        return self.close(world, frame, finite=finite)
 
     def _open(self, world: Any, frame: FramePlan) -> None:
         """Prepare the first substep: springs, links and start velocities."""
@@ -165,11 +147,20 @@ class Frames:
         if world._sleep:
             self._watch(world, frame.h, uninterrupted=frame.uninterrupted)
 
-    def _substeps(self, world: Any, frame: FramePlan) -> bool:
-        """Run all substeps, as many per call as possible. Returns False if a particle turned NaN or infinite."""
+    def substeps(self, world: Any, frame: FramePlan, reached: int | None = None) -> bool:
+        """Run all substeps, as many per call as possible. Returns False if a particle turned NaN or infinite.
+
+        reached: so many are done, and then an awake particle touches a sleeper.
+        """
         state, forces, engine, held = world._sorted, world._force_sum, self.held.engine, self.held
         h, half, by_core, uninterrupted, ledger = frame.h, frame.half, frame.by_core, frame.uninterrupted, frame.ledger
-        step, finite, met, before, self.repeats = 0, True, not uninterrupted, frame.before, False
+        step, finite, met, before, self.repeats = (
+            reached or 0,
+            True,
+            not uninterrupted or reached is not None,
+            frame.before,
+            False,
+        )
         while step < frame.substeps:
             opens, known = step == 0 or not by_core, held.kick > 0.0  # opens: velocities belong to the positions
             if met and world._sleep and world._sleep.anyone:
@@ -219,7 +210,7 @@ class Frames:
             world._show(step * h, lag) if world.observer and step < frame.substeps else None
         return bool(finite)
 
-    def _close(self, world: Any, frame: FramePlan, *, finite: bool) -> bool:
+    def close(self, world: Any, frame: FramePlan, *, finite: bool) -> bool:
         """Bring velocities to the time of the positions and report to listeners. False if a particle turned NaN or infinite."""
         state, engine, held, h, half, dt = world._sorted, self.held.engine, self.held, frame.h, frame.half, frame.dt
         forces = world._force_sum
@@ -233,7 +224,7 @@ class Frames:
         if frame.ledger:
             frame.ledger.end(half * h / held.kick)
         if frame.limited and frame.gravity == world.gravity:
-            self._limit(world, frame.limiter, dt, may_limit=frame.may_limit)
+            self.limit(world, frame.limiter, dt, may_limit=frame.may_limit)
         if world._contact_records is not None:
             world._contact_records.dt = dt
             if world._sleep:  # the core does not know the contacts of particles that fall asleep now
@@ -242,7 +233,7 @@ class Frames:
             world._events.record(recorded_events(engine, world._obstacle_arrays))
             world._events.sense(world._obstacle_arrays, *sensed_by(engine, world))
             engine.record_events(None)
-        self._let_sleep(world, dt, frame.gravity)
+        self.repeats = not self.let_sleep(world, dt, frame.gravity) and self.repeats
         frame.on_stage_end("finish")
         if state.periodic:
             engine.wrap_positions(state.crossed)
@@ -290,7 +281,7 @@ class Frames:
             self._pull = gravity, float(np.sqrt(x * x + y * y))
         return self._pull[1] if self.held.free else 0.0
 
-    def _limit(self, world: Any, limiter: Any, dt: float, *, may_limit: bool = True) -> None:
+    def limit(self, world: Any, limiter: Any, dt: float, *, may_limit: bool = True) -> None:
         """Remove the energy that a frame of dt seconds has gained, if it is too much."""
         if limiter is None and may_limit and gained_much(world) and undriven(world):
             limiter = EnergyLimiter(world, dt)
@@ -299,7 +290,7 @@ class Frames:
         if self.held.parting:
             self.held.parting = less_to_part(self.held.parting, dt, most_gained(world))
 
-    def _refuse_non_finite(self, world: Any, dt: float) -> None:
+    def refuse_non_finite(self, world: Any, dt: float) -> None:
         """Repeat a failed frame from the last good state and check each stage; normal frames pay nothing for this."""
         state = world._sorted
         last = state.first_non_finite()

@@ -18,6 +18,7 @@ from pyverlet.laws.precision import fine_up_to
 from pyverlet.laws.sleep import laws
 from pyverlet.state.state import MARKS, SET, moving
 from pyverlet.world.core_arrays import SORTED_FROM
+from pyverlet.world.frame_plan import FramePlan
 from pyverlet.world.long_frames import LONGEST
 from pyverlet.world.materials import BOUNDARIES
 
@@ -25,7 +26,7 @@ _WORLD = ("actors", "observer", "_contact_records")
 """Attributes that must stay the same; all others have setters or belong to other frames, which end plain frames."""
 
 
-_NOBODY = np.zeros(0, np.int64)
+_NO_ROWS = np.zeros(0, np.int64)
 
 
 def plain_frames(world: Any, dt: float) -> Any:
@@ -42,7 +43,7 @@ def plain_frames(world: Any, dt: float) -> Any:
     repeats = frames.repeats and frames.gravity is world.gravity and held.steps == world._substeps
     if not (
         (asleep or repeats)
-        and (sleep is None or (sleep.is_plain(sorted_state) and world._contact_records is None))
+        and (sleep is None or (sleep.is_plain and world._contact_records is None))
         and 0 < len(sorted_state) < SORTED_FROM
         and dt <= LONGEST
         and type(boundary) in BOUNDARIES
@@ -70,7 +71,7 @@ def plain_frames(world: Any, dt: float) -> Any:
         ],
         checked, changes, _of_obstacles(world),
         [world.actors, world.forces, world.links._links], _end, world.profile.plain,
-        asleep, sorted_state.sleep_timer, sorted_state.free if sleep else _NOBODY,
+        bool(sleep and sleep.anyone), asleep, sorted_state.sleep_timer, sorted_state.free if sleep else _NO_ROWS,
     )  # fmt: skip
 
 
@@ -105,7 +106,7 @@ def _of_obstacles(world: Any) -> list[tuple[Any, str, int]]:
 
 
 def _end(world: Any, plain: Any) -> None:
-    """End a frame in which a number may not be finite, that may have gained too much energy, or in which particles fall asleep.
+    """End a frame in which a number may not be finite, that may have gained too much energy, or in which particles sleep or wake.
 
     Raises:
         NonFiniteError: a particle turned NaN or infinite; the world still holds the frame before.
@@ -114,11 +115,30 @@ def _end(world: Any, plain: Any) -> None:
         try:
             if world._sleep:
                 world._sleep.look_again(world._state, laws(world))
-            if world._frames.end_plain(world, plain):
-                world._plain = None
+            with np.errstate(over="ignore", invalid="ignore"):
+                if _end_substeps(world, plain):
+                    world._plain = None
             world._sorted.scatter(world._state, plain.dt, world._frames.held.still())
         except PyverletError:
             world._plain = None
             raise
         finally:
             plain.pending = False
+
+
+def _end_substeps(world: Any, plain: Any) -> bool:
+    """Make the remaining substeps, check the frame, and put particles to sleep. Returns whether particles fell asleep or woke."""
+    frames, held, woken = world._frames, world._frames.held, plain.reached < world._substeps
+    if woken:  # before the next substep
+        frame = FramePlan(world, held, plain.dt, lambda _: None)
+        frames.close(world, frame, finite=frames.substeps(world, frame, plain.reached))
+    if world._sorted.first_non_finite() >= 0:
+        particle, known, _, _, *numbers = held.note(world._sorted)
+        try:
+            frames.refuse_non_finite(world, plain.dt)
+        finally:
+            held.go_back((particle, known, plain.given[:, :2], plain.given[:, 2], *numbers))
+            held.engine.record_contacts(False)
+    if plain.limited and not woken:
+        frames.limit(world, None, plain.dt)
+    return bool(woken or frames.let_sleep(world, plain.dt, world.gravity))
