@@ -119,7 +119,7 @@ def marks_differ(
 @kernel
 def was_set(p: cython.pointer(Plain)) -> cython.bint:
     """Whether the user has set anything but motion."""
-    n: cython.Py_ssize_t = p.w.count
+    n: cython.Py_ssize_t = p.taken.count  # while all sleep the engine may have no particles
     return (
         numbers_differ(p.radius, p.known, 0, n)
         or numbers_differ(p.mass, p.known, n, n)
@@ -140,7 +140,7 @@ def was_moved(p: cython.pointer(Plain)) -> cython.bint:
     m: cython.pointer(MovingRows) = p.taken
     moved: cython.bint = False
     for k in range(m.count):
-        if p.w.inverse_mass[k] > 0:
+        if not p.asleep and p.w.inverse_mass[k] > 0:
             continue
         i: cython.Py_ssize_t = m.order[k]
         moved |= m.x[2 * k] != m.x_from[2 * i] or m.x[2 * k + 1] != m.x_from[2 * i + 1]
@@ -224,8 +224,8 @@ def end_plain(p: cython.pointer(Plain)) -> cython.int:
 def find_far(p: cython.pointer(Plain)) -> cython.void:
     """Determine whether any particle is far from the origin."""
     p.far = False
-    for k in range(2 * p.w.count):
-        p.far |= p.w.position[k] > p.precise or p.w.position[k] < -p.precise
+    for k in range(2 * p.taken.count):
+        p.far |= p.taken.x[k] > p.precise or p.taken.x[k] < -p.precise
 
 
 @kernel
