@@ -81,7 +81,7 @@ class Sleep:
         return self.anyone and not len(sorted_state.free)
 
     def look_again(self, state: State, laws: Any) -> None:
-        """After frames of the core alone, in which no particle slept: the current laws and pinned particles, as `begin` has them."""
+        """After frames of the core alone, where no particle slept: save what `begin` saves of laws and pinned particles."""
         self._laws, self._pinned = laws, _pinned(state)
 
     @property
