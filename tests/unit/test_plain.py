@@ -187,6 +187,7 @@ def test_sleepers_of_a_copy_wake(long_way: Any) -> None:
 
     def run() -> list[Any]:
         world = heap(12, sleep=True)
+        world.obstacles.append(pv.Segment((-1, 0.05), (5, 0.05)))
         world.run(seconds=8, dt=DT)
         assert world.asleep.all()
         world, found = copy.deepcopy(world), []
