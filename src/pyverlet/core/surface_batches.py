@@ -44,15 +44,19 @@ TASK_RELAX_AGAIN = cython.declare(cython.int, 3)
 
 
 Rest = cython.struct(
-    vx=cython.pointer(real),  # (8,) m/s, first before, then after
+    vx=cython.pointer(real),  # (8,) m/s, before and after
     vy=cython.pointer(real),
-    spin=cython.pointer(real),  # rad/s
+    spin=cython.pointer(real),  # rad/s; this and the next two only with friction
+    radius=cython.pointer(real),  # m
+    ease=cython.pointer(real),  # as in `Step`
+    x=cython.pointer(real),  # m, unless relaxed
+    y=cython.pointer(real),
     push=cython.p_double,  # impulses after it, m/s
     drag=cython.p_double,
     room=cython.p_double,  # m that the particle keeps clear of other surfaces, over what it moves
     spare=cython.p_double,  # positive if no branch of `core.surface_contacts` is needed
 )
-"""Results for eight contacts."""
+"""The particles of eight contacts, and results for them."""
 
 
 @inlined
@@ -66,17 +70,25 @@ def carries_alone(w: cython.pointer(Step), i: cython.Py_ssize_t, k: cython.Py_ss
 
 
 @inlined
-def load_motion(w: cython.pointer(Step), k: cython.Py_ssize_t, r: cython.pointer(Rest), rough: cython.bint) -> cython.void:
-    """Load the motion of the particles of contacts k to k + 7."""
+def load_rest(
+    w: cython.pointer(Step), k: cython.Py_ssize_t, r: cython.pointer(Rest), rough: cython.bint, places: cython.bint
+) -> cython.void:  # fmt: skip
+    """Load what the particles of contacts k to k + 7 are and where, if `places`."""
     if rough:
         motion: lanes4 = take4(w.motion, w.contact_particle, k)
         store(r.vx, 0, motion.x)
         store(r.vy, 0, motion.y)
         store(r.spin, 0, motion.z)
+        store(r.radius, 0, gather(w.radius, w.contact_particle, k))
+        store(r.ease, 0, gather(w.ease, w.contact_particle, k) if w.mixed else spread(w.ease[0]))
     else:
         velocity: lanes2 = take(w.velocity, w.contact_particle, k)
         store(r.vx, 0, velocity.x)
         store(r.vy, 0, velocity.y)
+    if places:
+        position: lanes2 = take(w.position, w.contact_particle, k)
+        store(r.x, 0, position.x)
+        store(r.y, 0, position.y)
 
 
 @inlined
@@ -113,19 +125,9 @@ def solve_rest(
     vx: cython.pointer(real) = r.vx
     vy: cython.pointer(real) = r.vy
     spin: cython.pointer(real) = r.spin
-    radius: real[8]
-    ease: real[8]
-    px: real[8]
-    py: real[8]
     ax: real[8]
     ay: real[8]
-    if rough:
-        store(radius, 0, gather(w.radius, w.contact_particle, k))
-        store(ease, 0, gather(w.ease, w.contact_particle, k) if w.mixed else spread(w.ease[0]))
     if not relax:
-        position: lanes2 = take(w.position, w.contact_particle, k)
-        store(px, 0, position.x)
-        store(py, 0, position.y)
         acceleration: lanes2 = take(w.acceleration, w.contact_particle, k)
         store(ax, 0, acceleration.x)
         store(ay, 0, acceleration.y)
@@ -145,7 +147,7 @@ def solve_rest(
             speed -= 0.5 * (along * turned)
         else:
             speed = speed - row[at + GAP + n] / h + bend_excess(along, slide)
-            away: cython.double = fabs(px[n] - w.clear[clear + n]) + fabs(py[n] - w.clear[clear + 8 + n])
+            away: cython.double = fabs(r.x[n] - w.clear[clear + n]) + fabs(r.y[n] - w.clear[clear + 8 + n])
             away += h * (fabs(vx[n]) + fabs(vy[n])) + h * h * (fabs(ax[n]) + fabs(ay[n]))
             r.room[n] = w.clear[clear + 16 + n] - 2 * away
         after: cython.double = max(had + speed, 0.0)
@@ -154,12 +156,12 @@ def solve_rest(
         if rough:
             ux -= gain * nx
             uy -= gain * ny
-            rim: cython.double = spin[n] * radius[n]
+            rim: cython.double = spin[n] * r.radius[n]
             held: cython.double = row[at + DRAG + n]
-            new: cython.double = dragged(held, ux * ny - uy * nx - rim, ease[n], row[at + COULOMB + n] * after)
+            new: cython.double = dragged(held, ux * ny - uy * nx - rim, r.ease[n], row[at + COULOMB + n] * after)
             tangent = new - held
             r.drag[n] = new
-            spin[n] -= cython.cast(real, tangent * (ease[n] / cython.cast(cython.double, radius[n])))
+            spin[n] -= cython.cast(real, tangent * (r.ease[n] / cython.cast(cython.double, r.radius[n])))
         r.push[n] = after
         new_x: real = vx[n] + cython.cast(real, tangent * ny - gain * nx)
         new_y: real = vy[n] - cython.cast(real, tangent * nx + gain * ny)
@@ -181,26 +183,16 @@ def warm_rest(w: cython.pointer(Step), k: cython.Py_ssize_t, r: cython.pointer(R
     row: cython.p_double = w.contact
     at: cython.Py_ssize_t = row_of(k)
     n: cython.int
-    radius: real[8]
-    ease: real[8]
-    px: real[8]
-    py: real[8]
-    position: lanes2 = take(w.position, w.contact_particle, k)
-    store(px, 0, position.x)
-    store(py, 0, position.y)
-    if rough:
-        store(radius, 0, gather(w.radius, w.contact_particle, k))
-        store(ease, 0, gather(w.ease, w.contact_particle, k) if w.mixed else spread(w.ease[0]))
     for n in range(8):
         push: cython.double = row[at + PUSH + n]
         tangent: cython.double = row[at + DRAG + n] if rough else 0.0
-        r.room[n] = fabs(px[n] - row[at + SEEN + n]) + fabs(py[n] - row[at + SEEN_Y + n])
+        r.room[n] = fabs(r.x[n] - row[at + SEEN + n]) + fabs(r.y[n] - row[at + SEEN_Y + n])
         r.push[n] = push
         r.vx[n] += cython.cast(real, tangent * row[at + NORMAL_Y + n] - push * row[at + NORMAL + n])
         r.vy[n] -= cython.cast(real, tangent * row[at + NORMAL + n] + push * row[at + NORMAL_Y + n])
         if rough:
             r.drag[n] = tangent
-            r.spin[n] -= cython.cast(real, tangent * (ease[n] / cython.cast(cython.double, radius[n])))
+            r.spin[n] -= cython.cast(real, tangent * (r.ease[n] / cython.cast(cython.double, r.radius[n])))
 
 
 @inlined
@@ -209,7 +201,7 @@ def warm_eight(
 ) -> cython.Py_ssize_t:  # fmt: skip
     """Warm-start the particles of contacts k to k + 7, except `last`; returns the last one that was by itself."""
     n: cython.int
-    load_motion(w, k, r, rough)
+    load_rest(w, k, r, rough, True)
     warm_rest(w, k, r, rough)
     for n in range(8):
         i: cython.Py_ssize_t = w.contact_particle[k + n]
@@ -230,7 +222,7 @@ def hold_eight(
 ) -> cython.Py_ssize_t:  # fmt: skip
     """Hold the particles of contacts k to k + 7, except `last`; returns the last one that was held by itself."""
     n: cython.int
-    load_motion(w, k, r, rough)
+    load_rest(w, k, r, rough, True)
     solve_rest(w, k, r, rough, False)
     for n in range(8):
         i: cython.Py_ssize_t = w.contact_particle[k + n]
@@ -263,7 +255,7 @@ def relax_eight(
                 measure_surface(w, w.contact_particle[k + n], k + n, True)
     if carry == 0:
         return last
-    load_motion(w, k, r, rough)
+    load_rest(w, k, r, rough, False)
     solve_rest(w, k, r, rough, True)
     for n in range(8):
         i: cython.Py_ssize_t = w.contact_particle[k + n]
@@ -283,13 +275,18 @@ def solve_eights(w: cython.pointer(Step), block: cython.Py_ssize_t, task: cython
     vx: real[8]
     vy: real[8]
     spin: real[8]
+    radius: real[8]
+    ease: real[8]
+    x: real[8]
+    y: real[8]
     push: cython.double[8]
     drag: cython.double[8]
     room: cython.double[8]
     spare: cython.double[8]
     rest: Rest
     r: cython.pointer(Rest) = cython.address(rest)
-    r.vx, r.vy, r.spin, r.push, r.drag, r.room, r.spare = vx, vy, spin, push, drag, room, spare
+    r.vx, r.vy, r.spin, r.radius, r.ease, r.x, r.y = vx, vy, spin, radius, ease, x, y
+    r.push, r.drag, r.room, r.spare = push, drag, room, spare
     first: cython.Py_ssize_t = w.at_surface[block * BLOCK]
     final: cython.Py_ssize_t = w.at_surface[block * BLOCK + w.at_surface_count[block] - 1]
     last: cython.Py_ssize_t = -1
