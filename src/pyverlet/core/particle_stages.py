@@ -106,24 +106,26 @@ def drift(w: cython.pointer(Step), a: cython.Py_ssize_t, b: cython.Py_ssize_t, p
     stale: cython.bint = False
     whole: cython.Py_ssize_t = b - b % (8 if o.rough else 4)
     i: cython.Py_ssize_t
-    for i in range(a, whole if o.rough else a, 8):
-        m: lanes4 = load4(o.motion, i)
-        p: lanes2 = load2(o.position, i)
-        q: lanes2 = load2(o.checked, i)
-        far_x: lanes = m.x * spread(h)
-        far_y: lanes = m.y * spread(h)
-        px: lanes = p.x + far_x
-        py: lanes = p.y + far_y
-        store2(o.position, i, px, py)
-        far_x = far_x + (px - q.x)
-        far_y = far_y + (py - q.y)
-        stale |= any_lane(outside(above(spread(o.allowed), far_x * far_x + far_y * far_y)))
-    for i in range(2 * a, 2 * a if o.rough else 2 * whole, 8):
-        step: lanes = load(o.velocity, i) * spread(h)
-        there: lanes = load(o.position, i) + step
-        store(o.position, i, there)
-        away: lanes = there + step - load(o.checked, i)
-        stale |= any_lane(outside(above(spread(o.allowed), sum_of_pairs(away * away))))
+    if o.rough:
+        for i in range(a, whole, 8):
+            m: lanes4 = load4(o.motion, i)
+            p: lanes2 = load2(o.position, i)
+            q: lanes2 = load2(o.checked, i)
+            far_x: lanes = m.x * spread(h)
+            far_y: lanes = m.y * spread(h)
+            px: lanes = p.x + far_x
+            py: lanes = p.y + far_y
+            store2(o.position, i, px, py)
+            far_x = far_x + (px - q.x)
+            far_y = far_y + (py - q.y)
+            stale |= any_lane(outside(above(spread(o.allowed), far_x * far_x + far_y * far_y)))
+    else:
+        for i in range(2 * a, 2 * whole, 8):
+            step: lanes = load(o.velocity, i) * spread(h)
+            there: lanes = load(o.position, i) + step
+            store(o.position, i, there)
+            away: lanes = there + step - load(o.checked, i)
+            stale |= any_lane(outside(above(spread(o.allowed), sum_of_pairs(away * away))))
     v: cython.pointer(real) = o.motion if o.rough else o.velocity
     width: cython.Py_ssize_t = 4 if o.rough else 2
     for i in range(whole, b):

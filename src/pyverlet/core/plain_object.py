@@ -39,7 +39,7 @@ class PlainFrames:
         placed: (n,) becomes 1 where the user has moved a particle.
         order: (n,) the user's index of each row.
         angle: (n,) in the user's order.
-        slot_mass: (n,) kg.
+        sorted_mass: (n,) kg.
         numbers, marks: the user's columns, which must stay unchanged.
         law: (8,) seconds and substeps of a frame, gravity, J that a frame may gain, infinite for no limit, m from the origin
             up to which coordinates are precise enough for particles at rest, and the limit and time of `core.resting`.

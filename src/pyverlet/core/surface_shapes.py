@@ -213,7 +213,7 @@ def set_surface(
     y: cython.double = p.s * nx + p.c * ny
     row[first + NORMAL], row[first + NORMAL_Y] = x, y
     set_surface_speed(w, first, at, p.wx + w.radius[i] * x, p.wy + w.radius[i] * y, x, y, since)
-    if since == 0:
+    if since == 0:  # else they were combined at the start of the substep
         e: cython.double = w.segment[at + RESTITUTION]
         material: cython.Py_ssize_t = cython.cast(int64_t, w.segment[at + MATERIAL])
         mix(w, i, first, e, w.segment[at + FRICTION], w.segment[at + ROLLS], material)

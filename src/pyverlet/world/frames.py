@@ -44,7 +44,9 @@ class Frames:
     def __init__(self, dtype: np.dtype[Any]) -> None:
         self._dtype = dtype
         self.held = CoreArrays(dtype)
-        self._flight, self.links, self._time_step_check = FreeSteps(), CoreLinks(), TimeStepCheck()
+        self._flight = FreeSteps()
+        self.links = CoreLinks()
+        self._time_step_check = TimeStepCheck()
         self._law: Any = None  # the last arguments of `engine.set_law`
         self.repeats = False  # whether the next frame would pass the engine the same arguments
         self._pull: tuple[Any, float] = None, 0.0  # gravity and its magnitude, m/s^2
@@ -154,13 +156,8 @@ class Frames:
         """
         state, forces, engine, held = world._sorted, world._force_sum, self.held.engine, self.held
         h, half, by_core, uninterrupted, ledger = frame.h, frame.half, frame.by_core, frame.uninterrupted, frame.ledger
-        step, finite, met, before, self.repeats = (
-            reached or 0,
-            True,
-            not uninterrupted or reached is not None,
-            frame.before,
-            False,
-        )
+        step, finite, before, self.repeats = reached or 0, True, frame.before, False
+        met = reached is not None or not uninterrupted
         while step < frame.substeps:
             opens, known = step == 0 or not by_core, held.kick > 0.0  # opens: velocities belong to the positions
             if met and world._sleep and world._sleep.anyone:
@@ -233,7 +230,8 @@ class Frames:
             world._events.record(recorded_events(engine, world._obstacle_arrays))
             world._events.sense(world._obstacle_arrays, *sensed_by(engine, world))
             engine.record_events(None)
-        self.repeats = not self.let_sleep(world, dt, frame.gravity) and self.repeats
+        if self.let_sleep(world, dt, frame.gravity):
+            self.repeats = False  # the core watches for sleepers from the next frame on
         frame.on_stage_end("finish")
         if state.periodic:
             engine.wrap_positions(state.crossed)
